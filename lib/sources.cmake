@@ -1,0 +1,9 @@
+# SPDX-License-Identifier: MIT
+# SPDX-FileCopyrightText: 2026 the evstab authors
+#
+# The library as a plain list, for builds that do not use our CMake targets: include() this file, compile EVS_SOURCES
+# as C99 and put EVS_INCLUDE_DIR on the include path. Nothing else is needed.
+set(EVS_INCLUDE_DIR ${CMAKE_CURRENT_LIST_DIR}/include)
+set(EVS_SOURCES
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_types.c
+)
