@@ -23,16 +23,16 @@ extern "C" {
 
 /** What a call that can be refused returns. On any error its outputs are untouched. */
 typedef enum {
-    EVS_OK          = 0,
-    EVS_ERR_NULL    = -1, /**< A required pointer is NULL. */
-    EVS_ERR_ARG     = -2, /**< A setting or an argument is outside its documented range. */
-    EVS_ERR_SIZE    = -3, /**< A buffer of the caller is too small. */
-    EVS_ERR_TIME    = -4, /**< A time runs back or jumps further than the module allows. */
-    EVS_ERR_STATE   = -5, /**< The call does not fit the state, e.g. nothing was pushed yet. */
+    EVS_OK = 0,
+    EVS_ERR_NULL = -1,    /**< A required pointer is NULL. */
+    EVS_ERR_ARG = -2,     /**< A setting or an argument is outside its documented range. */
+    EVS_ERR_SIZE = -3,    /**< A buffer of the caller is too small. */
+    EVS_ERR_TIME = -4,    /**< A time runs back or jumps further than the module allows. */
+    EVS_ERR_STATE = -5,   /**< The call does not fit the state, e.g. nothing was pushed yet. */
     EVS_ERR_NUMERIC = -6, /**< No answer exists: no preimage, a zero vector, an overflow. */
     EVS_ERR_TOO_OLD = -7, /**< The time asked for has left the ring. */
     EVS_ERR_TOO_NEW = -8, /**< The time asked for is further ahead than may be predicted. */
-    EVS_ERR_GAP     = -9  /**< The samples around the time asked for are too far apart. */
+    EVS_ERR_GAP = -9      /**< The samples around the time asked for are too far apart. */
 } evs_status_t;
 
 /** Constant text of a status, e.g. "EVS_ERR_ARG"; "EVS_ERR_?" for a value that is none. */
@@ -53,8 +53,7 @@ EVS_STATIC_ASSERT(sizeof(evs_event_t) == 8u, "an event is 8 bytes");
 
 static inline evs_event_t evs_event_make(uint32_t t_us, uint16_t x_px, uint16_t y_px, bool brighter)
 {
-    const evs_event_t ev = {t_us, x_px,
-                            (uint16_t)((y_px & 0x7FFFu) | (brighter ? EVS_EVENT_POLARITY_BIT : 0u))};
+    const evs_event_t ev = {t_us, x_px, (uint16_t)((y_px & 0x7FFFu) | (brighter ? EVS_EVENT_POLARITY_BIT : 0u))};
     return ev;
 }
 static inline uint16_t evs_event_x_px(evs_event_t ev) { return ev.x_px; }
@@ -69,7 +68,7 @@ typedef struct {
 
 EVS_STATIC_ASSERT(sizeof(evs_point_t) == 4u, "a point is 4 bytes");
 
-#define EVS_POINT_MAX_Q4     32752   /**< 2047 px. */
+#define EVS_POINT_MAX_Q4     32752     /**< 2047 px. */
 #define EVS_POINT_OUTSIDE_Q4 INT16_MIN /**< Both coordinates of the marker. */
 
 /** The marker for "no position": off the sensor, no preimage, behind the camera, or out of range. */
