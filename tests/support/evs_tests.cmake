@@ -5,12 +5,13 @@
 # A test that cannot run here (say, a recording is missing) prints why and exits 77: ctest shows it as skipped.
 set(EVS_SKIP_CODE 77)
 
-# evs_add_c_test(<label> <name> SOURCES <file>... [LIBS <target>...] [ARGS <arg>...] [TIMEOUT <s>] [HOST_ONLY])
+# evs_add_c_test(<label> <name> SOURCES <file>... [LIBS <target>...] [ARGS <arg>...] [DEFINES <macro>...]
+#                [TIMEOUT <s>] [HOST_ONLY])
 # builds test_<name> and adds it as the test <label>.<name>. In a cross build it becomes an image for the board and runs
 # in QEMU; EVS_DATA_DIR is in its environment on the host.
 function(evs_add_c_test label name)
-  cmake_parse_arguments(PARSE_ARGV 2 arg "HOST_ONLY" "TIMEOUT" "SOURCES;LIBS;ARGS")
-  if(arg_HOST_ONLY AND CMAKE_CROSSCOMPILING)
+  cmake_parse_arguments(PARSE_ARGV 2 arg "HOST_ONLY" "TIMEOUT" "SOURCES;LIBS;ARGS;DEFINES")
+  if(CMAKE_CROSSCOMPILING AND (arg_HOST_ONLY OR NOT EVS_BOARD))
     return()
   endif()
   if(NOT arg_TIMEOUT)
@@ -18,6 +19,7 @@ function(evs_add_c_test label name)
   endif()
   add_executable(test_${name} ${arg_SOURCES})
   target_link_libraries(test_${name} PRIVATE evs::evs evs_unity evs_warnings ${arg_LIBS})
+  target_compile_definitions(test_${name} PRIVATE ${arg_DEFINES})
   if(CMAKE_CROSSCOMPILING)
     target_link_libraries(test_${name} PRIVATE evs_board)
   endif()
@@ -32,7 +34,7 @@ function(evs_add_c_test label name)
   endif()
 endfunction()
 
-# evs_add_unit_test(<module> [SOURCES <more files>...] [LIBS <target>...] [TIMEOUT <s>] [HOST_ONLY])
+# evs_add_unit_test(<module> [SOURCES <more files>...] [LIBS <target>...] [DEFINES <macro>...] [TIMEOUT <s>] [HOST_ONLY])
 # tests one module of the library: test_<module>.c. HOST_ONLY is for what no microcontroller can do (say, read files).
 function(evs_add_unit_test module)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES")

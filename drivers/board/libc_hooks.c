@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: MIT
+ * SPDX-FileCopyrightText: 2026 the evstab authors */
+/* What picolibc asks of a board. Only tests need it: the library calls nothing of this. */
+#include "board.h"
+#include "semihost.h"
+
+#include <stdio.h>
+
+void __assert_func(const char *file, int line, const char *function, const char *condition) __attribute__((noreturn));
+void _exit(int code) __attribute__((noreturn));
+
+static int put(char c, FILE *stream)
+{
+    (void)stream;
+    board_putc((unsigned char)c);
+    return (unsigned char)c;
+}
+
+static FILE console = FDEV_SETUP_STREAM(put, NULL, NULL, _FDEV_SETUP_WRITE);
+FILE *const stdout = &console;
+FILE *const stderr = &console;
+
+void _exit(int code)
+{
+    board_flush();
+    semihost_exit(code);
+}
+
+void __assert_func(const char *file, int line, const char *function, const char *condition)
+{
+    printf("%s:%d: %s: assertion failed: %s\n", file, line, (function != NULL) ? function : "?", condition);
+    _exit(BOARD_EXIT_ASSERT);
+}
