@@ -1,2 +1,52 @@
 # SPDX-License-Identifier: MIT
 # SPDX-FileCopyrightText: 2026 the evstab authors
+#
+# With EVS_TARGET_TESTS a host build covers the other builds too: each is configured and compiled by a test of its own
+# (target.<name>.build), and every test that it holds appears here as target.<name>.<test>. So one ctest run, with one
+# closing line, tells about all of them.
+set(targets_with_board m4f m7 m55 rv32)
+set(targets_without_board m0plus m33)
+set(targets_root ${PROJECT_BINARY_DIR}/target)
+
+# evs_add_tree(<name> [TARGET <build target>] <CMake argument>...): a build folder ${targets_root}/<name> as a test that
+# others can require as the fixture tree_<name>.
+function(evs_add_tree name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "TARGET" "")
+  if(NOT arg_TARGET)
+    set(arg_TARGET all)
+  endif()
+  string(REPLACE ";" "|" arguments "${arg_UNPARSED_ARGUMENTS}")
+  add_test(NAME target.${name}.build
+           COMMAND ${CMAKE_COMMAND} -DSOURCE=${PROJECT_SOURCE_DIR} -DBINARY=${targets_root}/${name} -DTARGET=${arg_TARGET}
+                   "-DARGUMENTS=-DEVS_DEPS_DIR=${EVS_DEPS_DIR}|-DEVS_DATA_DIR=${EVS_DATA_DIR}|-DEVS_UNITY_DIR=${EVS_UNITY_DIR}|-DEVS_WERROR=ON|${arguments}"
+                   -P ${CMAKE_CURRENT_SOURCE_DIR}/build_tree.cmake)
+  # Each build takes all cores by itself.
+  set_tests_properties(target.${name}.build PROPERTIES LABELS target TIMEOUT 900 FIXTURES_SETUP tree_${name} RUN_SERIAL ON)
+endfunction()
+
+# One test of a tree, run by the tree's own ctest: it knows the emulator and the arguments.
+function(evs_add_tree_test tree test)
+  string(REPLACE "." "\\." pattern "${test}")
+  add_test(NAME target.${tree}.${test}
+           COMMAND ${CMAKE_CTEST_COMMAND} --test-dir ${targets_root}/${tree} --output-on-failure --no-tests=error
+                   -R "^${pattern}$")
+  set_tests_properties(
+    target.${tree}.${test} PROPERTIES LABELS target TIMEOUT 600 FIXTURES_REQUIRED tree_${tree}
+                                      SKIP_REGULAR_EXPRESSION "\\*\\*\\*Skipped")
+endfunction()
+
+get_property(portable_tests GLOBAL PROPERTY EVS_TESTS_FOR_TARGETS)
+foreach(target IN LISTS targets_with_board targets_without_board)
+  evs_add_tree(${target} -DCMAKE_BUILD_TYPE=Release --toolchain ${PROJECT_SOURCE_DIR}/lib/cmake/${target}.cmake)
+  foreach(test IN ITEMS evs refuses_heap refuses_libm refuses_stdio refuses_data refuses_bss)
+    evs_add_tree_test(${target} symbols.${test})
+  endforeach()
+endforeach()
+foreach(target IN ITEMS m0plus m4f m33 rv32) # The others multiply doubles in hardware: nothing there to refuse.
+  evs_add_tree_test(${target} symbols.refuses_double)
+endforeach()
+foreach(target IN LISTS targets_with_board)
+  foreach(test IN ITEMS board.check board.assert board.fault ${portable_tests})
+    evs_add_tree_test(${target} ${test})
+  endforeach()
+endforeach()

@@ -24,7 +24,8 @@ static int check(int argc, char **argv)
     if ((argc != 3) || (strcmp(argv[1], "check") != 0) || (strcmp(argv[2], "a,b") != 0)) { return 3; }
     errno = 0; /* Thread-local, and not next to anything it may overwrite. */
     if (!isnan(sqrt(minus_one)) || (initialized != 7) || (cleared != 0)) { return 4; }
-    return (fabs(sin(-minus_one) - 0.8414709848078965) < 1e-15) ? EXIT_AS_ASKED : 5;
+    if ((floor(minus_one * 11395335.03) != -11395336.0) || (ceil(minus_one * -11395335.03) != 11395336.0)) { return 5; }
+    return (fabs(sin(-minus_one) - 0.8414709848078965) < 1e-15) ? EXIT_AS_ASKED : 6;
 }
 
 /* An instruction that no core knows. */
