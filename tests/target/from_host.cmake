@@ -50,3 +50,17 @@ foreach(target IN LISTS targets_with_board)
     evs_add_tree_test(${target} ${test})
   endforeach()
 endforeach()
+
+# The numbers in docs/, measured on what was just built.
+find_package(Python3 REQUIRED COMPONENTS Interpreter)
+set(memory_table ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/tests/support/memory_table.py ${targets_root})
+evs_add_script_test(docs memory COMMAND ${memory_table} --check ${PROJECT_SOURCE_DIR}/docs/memory.md)
+set_tests_properties(docs.memory PROPERTIES FIXTURES_REQUIRED "tree_m0plus;tree_m4f;tree_m7;tree_m55;tree_rv32")
+
+# Builds the targets and writes the numbers into docs/ again.
+add_custom_target(
+  evs_update_docs
+  COMMAND ${CMAKE_CTEST_COMMAND} --output-on-failure -R "^target[.][a-z0-9]+[.]build$"
+  COMMAND ${memory_table} --write ${PROJECT_SOURCE_DIR}/docs/memory.md
+  WORKING_DIRECTORY ${PROJECT_BINARY_DIR}
+  USES_TERMINAL VERBATIM)
