@@ -51,8 +51,23 @@ foreach(target IN LISTS targets_with_board)
   endforeach()
 endforeach()
 
-# The numbers in docs/, measured on what was just built.
+# The instruction counter, on a program whose counts are known: 10 calls of nothing, of 201 instructions, of the same.
 find_package(Python3 REQUIRED COMPONENTS Interpreter)
+if(TARGET evcount)
+  foreach(target IN LISTS targets_with_board)
+    set(board_m4f mps2-an386)
+    set(board_m7 mps2-an500)
+    set(board_m55 mps3-an547)
+    set(board_rv32 riscv32-virt)
+    evs_add_script_test(target ${target}.count_is_exact COMMAND
+      ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/tests/bench/count_insns.py $<TARGET_FILE:evcount>
+      ${CMAKE_CURRENT_SOURCE_DIR}/run_qemu.sh ${board_${target}} ${targets_root}/${target}/tests/bench/bench_loop
+      --expect 0=10:0 1=10:2010 2=10:2010)
+    set_tests_properties(target.${target}.count_is_exact PROPERTIES FIXTURES_REQUIRED tree_${target})
+  endforeach()
+endif()
+
+# The numbers in docs/, measured on what was just built.
 set(memory_table ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/tests/support/memory_table.py ${targets_root})
 evs_add_script_test(docs memory COMMAND ${memory_table} --check ${PROJECT_SOURCE_DIR}/docs/memory.md)
 set_tests_properties(docs.memory PROPERTIES FIXTURES_REQUIRED "tree_m0plus;tree_m4f;tree_m7;tree_m55;tree_rv32")
