@@ -1,0 +1,45 @@
+/* SPDX-License-Identifier: MIT
+ * SPDX-FileCopyrightText: 2026 the evstab authors */
+/**
+ * @file  evs/clock.h
+ * @brief Guards a stream against times that run back, without being fooled for ever by one bad time.
+ *
+ * Model    A time before the newest accepted one is refused. One wild time ahead would so silence the stream until the
+ *          clock caught up with it: when EVS_CLOCK_RESTART_AFTER refused times follow each other, each not before
+ *          the one before it, the stream itself is taken to have restarted (sensor reset, or the wild time undone).
+ * Memory   one evs_clock_t.
+ * Cost     about 10 instructions per time.
+ * Time     wraps; times must lie less than 2^31 us (35 min) apart.
+ */
+#ifndef EVS_CLOCK_H
+#define EVS_CLOCK_H
+
+#include "evs/types.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define EVS_CLOCK_RESTART_AFTER 16u
+
+typedef enum {
+    EVS_CLOCK_FORWARD, /**< Accepted. */
+    EVS_CLOCK_BACK,    /**< Refused: before the newest (or equal, where equal times are refused). */
+    EVS_CLOCK_RESTART  /**< Accepted as the first time of a restarted clock: forget what depends on older times. */
+} evs_clock_verdict_t;
+
+typedef struct { /** Context; zero-initialize it. Every member is private. */
+    uint32_t newest_us;
+    uint32_t refused_us;
+    uint32_t n_back;
+    uint16_t n_refused_run;
+    bool started;
+} evs_clock_t;
+
+/** Judge the next time of a stream. @param equal_ok  Whether a time equal to the newest is accepted. */
+evs_clock_verdict_t evs_clock_step(evs_clock_t *clock, uint32_t t_us, bool equal_ok);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

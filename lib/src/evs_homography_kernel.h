@@ -1,0 +1,83 @@
+/* SPDX-License-Identifier: MIT
+ * SPDX-FileCopyrightText: 2026 the evstab authors */
+/* One point through a homography. Private to the kernels; every variant must give these bits. */
+#ifndef EVS_HOMOGRAPHY_KERNEL_H
+#define EVS_HOMOGRAPHY_KERNEL_H
+
+#include "evs/homography.h"
+#include "evs_recip_table.h"
+
+#define W_CELL_BITS 18 /* Depth ratio Q26: 256 cells of 2^18 on [1/2, 3/2). */
+
+#if !EVS_NO_SIMD && defined(__x86_64__) && defined(__GNUC__)
+#define EVS_HOMOGRAPHY_HAS_AVX2 1
+#else
+#define EVS_HOMOGRAPHY_HAS_AVX2 0
+#endif
+
+/* The map by exact division, for points that the fast path refuses. */
+evs_point_t evs_homography_map_exact(const evs_homography_t *h, evs_point_t p);
+
+/* map_fast() of eight points at a time; returns how many it mapped. Only where the processor has AVX2. */
+size_t evs_homography_map_avx2(const evs_homography_t *h, const evs_point_t *in, size_t n, evs_point_t *out);
+
+#if !EVS_NO_SIMD && defined(__ARM_FEATURE_DSP) && defined(__GNUC__)
+/* One instruction each on cores with the DSP extension; the plain C beside them is what they compute. */
+static inline int32_t madw_low(int32_t acc, int32_t coef, int32_t packed)
+{
+    __asm__("smlawb %0, %1, %2, %3" : "=r"(acc) : "r"(coef), "r"(packed), "r"(acc));
+    return acc;
+}
+static inline int32_t madw_high(int32_t acc, int32_t coef, int32_t packed)
+{
+    __asm__("smlawt %0, %1, %2, %3" : "=r"(acc) : "r"(coef), "r"(packed), "r"(acc));
+    return acc;
+}
+static inline int32_t add_mul_hi(int32_t acc, int32_t a, int32_t b)
+{
+    __asm__("smmla %0, %1, %2, %3" : "=r"(acc) : "r"(a), "r"(b), "r"(acc));
+    return acc;
+}
+#else
+/* acc + coef * (half of packed) / 2^16, rounded down. */
+static inline int32_t madw_low(int32_t acc, int32_t coef, int32_t packed)
+{
+    return acc + (int32_t)(((int64_t)coef * (int16_t)(uint16_t)((uint32_t)packed & 0xFFFFu)) >> 16);
+}
+static inline int32_t madw_high(int32_t acc, int32_t coef, int32_t packed)
+{
+    return acc + (int32_t)(((int64_t)coef * (packed >> 16)) >> 16);
+}
+static inline int32_t add_mul_hi(int32_t acc, int32_t a, int32_t b) { return acc + evs_mul_hi(a, b); }
+#endif
+
+/* x in the low, y in the high half: how a point lies in memory on a little-endian core. */
+static inline int32_t pack_point(evs_point_t p)
+{
+    return (int32_t)((uint32_t)(uint16_t)p.x_q4 | ((uint32_t)(uint16_t)p.y_q4 << 16));
+}
+
+static inline evs_point_t map_fast(const evs_homography_t *h, evs_point_t p)
+{
+    const int32_t xy = pack_point(p);
+
+    /* Depth ratio less 1/2; everything outside [1/2, 3/2) and the marker take the exact path. */
+    const uint32_t w_q26 = (uint32_t)madw_high(madw_low(h->w0_q26, h->wx_q38, xy), h->wy_q38, xy);
+    const uint32_t cell = w_q26 >> W_CELL_BITS;
+    if ((cell >= EVS_RECIP_CELLS) || evs_point_is_outside(p)) { return evs_homography_map_exact(h, p); }
+    const int32_t f_q32 = (int32_t)((w_q26 << (32 - W_CELL_BITS)) ^ UINT32_C(0x80000000));
+    const int32_t r_q29 = add_mul_hi(EVS_RECIP_Q29[cell][0], EVS_RECIP_Q29[cell][1], f_q32);
+
+    const int32_t a_q16 = madw_high(madw_low(h->a0_q16, h->ax_q28, xy), h->ay_q28, xy);
+    const int32_t b_q16 = madw_high(madw_low(h->b0_q16, h->bx_q28, xy), h->by_q28, xy);
+    const int32_t x_q4 = add_mul_hi(h->cx_q13, a_q16, r_q29) >> 9;
+    const int32_t y_q4 = add_mul_hi(h->cy_q13, b_q16, r_q29) >> 9;
+    if (((uint32_t)(x_q4 + EVS_POINT_MAX_Q4) > 2u * EVS_POINT_MAX_Q4) ||
+        ((uint32_t)(y_q4 + EVS_POINT_MAX_Q4) > 2u * EVS_POINT_MAX_Q4)) {
+        return evs_point_outside();
+    }
+    const evs_point_t mapped = {(int16_t)x_q4, (int16_t)y_q4};
+    return mapped;
+}
+
+#endif
