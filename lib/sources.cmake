@@ -5,13 +5,16 @@
 # as C99 and put EVS_INCLUDE_DIR on the include path. Nothing else is needed.
 set(EVS_INCLUDE_DIR ${CMAKE_CURRENT_LIST_DIR}/include)
 set(EVS_SOURCES
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_camera.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_clock.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_fixed.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_homography.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_homography_avx2.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_orientation_track.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_stabilize.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_tiles.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_types.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_vec.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_wide.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_window.c
 )

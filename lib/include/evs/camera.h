@@ -59,9 +59,11 @@ typedef struct {
 
 typedef struct { /** Context. A complete type only so that you can place it: every member is private. */
     evs_camera_config_t cfg;
-    int64_t poly_q32[4];  /**< Radial polynomial 1 + c0 t^2 + c1 t^4 + c2 t^6 + c3 t^8. */
-    int64_t domain_q32;   /**< Largest t: a radius (pinhole) or an angle (fisheye). */
-    int64_t domain_d_q32; /**< Distorted radius there. */
+    int64_t poly_q32[4];    /**< Radial polynomial 1 + c0 t^2 + c1 t^4 + c2 t^6 + c3 t^8. */
+    int64_t tangential_q32; /**< |(p1, p2)|; 0 for a fisheye. */
+    int64_t domain_q32;     /**< Largest t: a radius (pinhole) or an angle (fisheye). */
+    int64_t domain_d_q32;   /**< Distorted radius there. */
+    int64_t reach_q32;      /**< No pixel farther out than this has a preimage. */
 } evs_camera_t;
 
 /** A position on the image in px, 16 fractional bits. */

@@ -10,6 +10,7 @@
 #ifndef EVS_FLOAT_H
 #define EVS_FLOAT_H
 
+#include "evs/camera.h"
 #include "evs/vec.h"
 
 #ifdef __cplusplus
@@ -61,6 +62,38 @@ static inline evs_quat_t evs_quat_from_double(double w, double x, double y, doub
     const evs_quat_t q = {evs_q_from_double(w, 30), evs_q_from_double(x, 30), evs_q_from_double(y, 30),
                           evs_q_from_double(z, 30)};
     return q;
+}
+
+/**
+ * A calibration from the numbers that calibration tools print.
+ * @param[out] cfg   Untouched on error.
+ * @param      k_px  fx, fy, cx, cy.
+ * @param      dist  As OpenCV orders them: k1, k2, p1, p2, k3 (pinhole) or k1, k2, k3, k4, 0 (fisheye).
+ * @return EVS_OK, or EVS_ERR_ARG when a number is not finite or beyond the range in evs/camera.h; evs_camera_init() checks
+ *         the rest.
+ */
+EVS_NODISCARD static inline evs_status_t evs_camera_config_from_double(evs_camera_config_t *cfg,
+                                                                       evs_camera_model_t model, uint16_t width_px,
+                                                                       uint16_t height_px, const double k_px[4],
+                                                                       const double dist[EVS_CAMERA_N_DIST])
+{
+    evs_camera_config_t c = {model, width_px, height_px, 0, 0, 0, 0, {0, 0, 0, 0, 0}};
+    for (unsigned i = 0u; i < 4u; i++) {
+        if (!evs_q_fits(k_px[i], 16)) { return EVS_ERR_ARG; }
+    }
+    c.fx_q16 = evs_q_from_double(k_px[0], 16);
+    c.fy_q16 = evs_q_from_double(k_px[1], 16);
+    c.cx_q16 = evs_q_from_double(k_px[2], 16);
+    c.cy_q16 = evs_q_from_double(k_px[3], 16);
+    for (unsigned i = 0u; i < EVS_CAMERA_N_DIST; i++) {
+        const double scaled = dist[i] * evs_q_one(32);
+        if (!((scaled >= -(double)EVS_CAMERA_DIST_MAX_Q32) && (scaled <= (double)EVS_CAMERA_DIST_MAX_Q32))) {
+            return EVS_ERR_ARG;
+        }
+        c.dist_q32[i] = (int64_t)(scaled + ((scaled < 0.0) ? -0.5 : 0.5));
+    }
+    *cfg = c;
+    return EVS_OK;
 }
 
 /** Coordinates of a point in px. */
