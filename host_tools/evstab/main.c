@@ -1,0 +1,49 @@
+/* SPDX-License-Identifier: MIT
+ * SPDX-FileCopyrightText: 2026 the evstab authors */
+#include <stdio.h>
+#include <string.h>
+
+#include "command.h"
+#include "evs/version.h"
+
+static const struct {
+    const char *name;
+    const char *summary;
+    int (*run)(int argc, char **argv);
+} COMMANDS[] = {
+    {"info", "what a file or a folder holds, and what is wrong with it", evt_info_main},
+};
+
+static void print_help(FILE *out)
+{
+    (void)fprintf(
+        out,
+        "evstab %s: stabilizes the view of a shaken event camera.\n\nUsage: evstab COMMAND [options]\n\nCommands:\n",
+        EVS_VERSION_STRING);
+    for (size_t i = 0; i < sizeof COMMANDS / sizeof COMMANDS[0]; i++) {
+        (void)fprintf(out, "  %-10s %s\n", COMMANDS[i].name, COMMANDS[i].summary);
+    }
+    (void)fprintf(out,
+                  "\n'evstab COMMAND --help' tells more about one of them; 'evstab --version' prints the version.\n");
+}
+
+int main(int argc, char **argv)
+{
+    if (argc < 2) {
+        print_help(stderr);
+        return EVT_EXIT_USAGE;
+    }
+    if ((strcmp(argv[1], "--help") == 0) || (strcmp(argv[1], "-h") == 0) || (strcmp(argv[1], "help") == 0)) {
+        print_help(stdout);
+        return EVT_EXIT_OK;
+    }
+    if (strcmp(argv[1], "--version") == 0) {
+        (void)printf("evstab %s\n", EVS_VERSION_STRING);
+        return EVT_EXIT_OK;
+    }
+    for (size_t i = 0; i < sizeof COMMANDS / sizeof COMMANDS[0]; i++) {
+        if (strcmp(argv[1], COMMANDS[i].name) == 0) { return COMMANDS[i].run(argc - 1, argv + 1); }
+    }
+    (void)fprintf(stderr, "evstab: unknown command '%s'; 'evstab --help' lists them\n", argv[1]);
+    return EVT_EXIT_USAGE;
+}
