@@ -94,7 +94,7 @@ if(NOT evs_unity_found)
 
   add_library(evs_unity STATIC ${unity_dir}/unity.c)
   target_include_directories(evs_unity SYSTEM PUBLIC ${unity_dir})
-  target_compile_definitions(evs_unity PUBLIC UNITY_INCLUDE_DOUBLE)
+  target_compile_definitions(evs_unity PUBLIC UNITY_INCLUDE_DOUBLE UNITY_SUPPORT_64)
   if(EVS_BOARD)
     target_compile_definitions(evs_unity PUBLIC "UNITY_OUTPUT_CHAR(c)=board_putc(c)"
                                                 "UNITY_OUTPUT_CHAR_HEADER_DECLARATION=board_putc(int c)")
