@@ -5,6 +5,7 @@
 # as C99 and put EVS_INCLUDE_DIR on the include path. Nothing else is needed.
 set(EVS_INCLUDE_DIR ${CMAKE_CURRENT_LIST_DIR}/include)
 set(EVS_SOURCES
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_attitude.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_camera.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_clock.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_fixed.c
