@@ -112,6 +112,7 @@ def generate(trees):
         for module in modules:
             stack[module, tree.name] = graph.deepest(module)
     names = [TARGETS[tree.name] for tree in trees]
+    modules = [m for m in modules if any(text[m, tree.name] for tree in trees)]  # Kernels of host processors are empty.
 
     def cells(values, module):
         return [values[module, tree.name] for tree in trees]

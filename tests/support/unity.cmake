@@ -35,7 +35,7 @@ if(NOT EVS_UNITY_DIR AND NOT CMAKE_CROSSCOMPILING)
     if(EVS_UNITY_HAS_DOUBLE)
       add_library(evs_unity INTERFACE)
       target_link_libraries(evs_unity INTERFACE unity::framework)
-      target_compile_definitions(evs_unity INTERFACE UNITY_INCLUDE_DOUBLE)
+      target_compile_definitions(evs_unity INTERFACE UNITY_INCLUDE_DOUBLE UNITY_SUPPORT_64)
       set(evs_unity_found TRUE)
     endif()
   endif()
@@ -94,7 +94,7 @@ if(NOT evs_unity_found)
 
   add_library(evs_unity STATIC ${unity_dir}/unity.c)
   target_include_directories(evs_unity SYSTEM PUBLIC ${unity_dir})
-  target_compile_definitions(evs_unity PUBLIC UNITY_INCLUDE_DOUBLE UNITY_SUPPORT_64)
+  target_compile_definitions(evs_unity PUBLIC UNITY_INCLUDE_DOUBLE UNITY_SUPPORT_64) # 64 bits: off on 32-bit cores
   if(EVS_BOARD)
     target_compile_definitions(evs_unity PUBLIC "UNITY_OUTPUT_CHAR(c)=board_putc(c)"
                                                 "UNITY_OUTPUT_CHAR_HEADER_DECLARATION=board_putc(int c)")
