@@ -2,15 +2,8 @@
  * SPDX-FileCopyrightText: 2026 the evstab authors */
 #include "evs/clock.h"
 
-evs_clock_verdict_t evs_clock_step(evs_clock_t *clock, uint32_t t_us, bool equal_ok)
+evs_clock_verdict_t evs_clock_refuse(evs_clock_t *clock, uint32_t t_us)
 {
-    const int32_t ahead_us = evs_time_diff_us(t_us, clock->newest_us);
-    if (!clock->started || (ahead_us > 0) || (equal_ok && (ahead_us == 0))) {
-        clock->started = true;
-        clock->newest_us = t_us;
-        clock->n_refused_run = 0u;
-        return EVS_CLOCK_FORWARD;
-    }
     const bool in_order = (clock->n_refused_run > 0u) && (evs_time_diff_us(t_us, clock->refused_us) >= 0);
     clock->n_refused_run = in_order ? (uint16_t)(clock->n_refused_run + 1u) : 1u;
     clock->refused_us = t_us;

@@ -13,8 +13,8 @@
 
 #define COEF_MAX_Q28  INT64_C(0x40000000) /* 4.0: with coordinates below 2048 px a numerator stays below 2^15 px. */
 #define SHIFT_MAX_Q16 INT64_C(0x38000000) /* 14336 px */
-#define W_COEF_MAX    INT64_C(0x40000000) /* Q38: 8.0 in Q26 at 2048 px */
-#define W0_MAX_Q26    INT64_C(0x20000000) /* 8.0 */
+#define W_COEF_MAX    INT64_C(0x40000000) /* Q35: 64 in Q23 at 2048 px */
+#define W0_MAX_Q23    INT64_C(0x20000000) /* 64 */
 
 static bool in_range(int32_t x, int32_t lo, int32_t hi) { return (x >= lo) && (x <= hi); }
 
@@ -64,16 +64,16 @@ static void set_fast(evs_homography_t *h, const evs_pinhole_t *k)
         evs_shr_r64(evs_shr_r64(h->row_q30[0][2] * inv_q28, 30) * k->fx_q16 - ax * k->cx_q16 - ay * k->cy_q16, 28);
     const int64_t b0 =
         evs_shr_r64(evs_shr_r64(h->row_q30[1][2] * inv_q28, 30) * k->fy_q16 - bx * k->cx_q16 - by * k->cy_q16, 28);
-    /* (r / w) / fx: Q28 times 2^16 / fx_q16, to Q38. */
-    const int64_t wx = evs_shr_r64(evs_shr_r64(h->row_q30[2][0] * inv_q28, 30) * (int64_t)fx_recip, fx_shift - 26u);
-    const int64_t wy = evs_shr_r64(evs_shr_r64(h->row_q30[2][1] * inv_q28, 30) * (int64_t)fx_recip, fx_shift - 26u);
+    /* (r / w) / fx: Q28 times 2^16 / fx_q16, to Q35. */
+    const int64_t wx = evs_shr_r64(evs_shr_r64(h->row_q30[2][0] * inv_q28, 30) * (int64_t)fx_recip, fx_shift - 23u);
+    const int64_t wy = evs_shr_r64(evs_shr_r64(h->row_q30[2][1] * inv_q28, 30) * (int64_t)fx_recip, fx_shift - 23u);
     if (!below(ax, COEF_MAX_Q28) || !below(ay, COEF_MAX_Q28) || !below(bx, COEF_MAX_Q28) || !below(by, COEF_MAX_Q28) ||
         !below(a0, SHIFT_MAX_Q16) || !below(b0, SHIFT_MAX_Q16) || !below(wx, W_COEF_MAX) || !below(wy, W_COEF_MAX)) {
         return;
     }
     const int64_t w0 = evs_shr_r64(
-        evs_shr_r64(h->row_q30[2][2] * inv_q28, 30) * (INT64_C(1) << 26) - wx * k->cx_q16 - wy * k->cy_q16, 28);
-    if (!below(w0, W0_MAX_Q26)) { return; }
+        evs_shr_r64(h->row_q30[2][2] * inv_q28, 30) * (INT64_C(1) << 23) - wx * k->cx_q16 - wy * k->cy_q16, 28);
+    if (!below(w0, W0_MAX_Q23)) { return; }
 
     /* Each row rounds down twice; +1 centres that. The kernel wants the depth ratio less 1/2. */
     h->ax_q28 = (int32_t)ax;
@@ -82,9 +82,9 @@ static void set_fast(evs_homography_t *h, const evs_pinhole_t *k)
     h->bx_q28 = (int32_t)bx;
     h->by_q28 = (int32_t)by;
     h->b0_q16 = (int32_t)b0 + 1;
-    h->wx_q38 = (int32_t)wx;
-    h->wy_q38 = (int32_t)wy;
-    h->w0_q26 = (int32_t)w0 + 1 - (INT32_C(1) << 25);
+    h->wx_q35 = (int32_t)wx;
+    h->wy_q35 = (int32_t)wy;
+    h->w0_q23 = (int32_t)w0 + 1 - (INT32_C(1) << 22);
     /* Half an output LSB, for the rounding. */
     h->cx_q13 = evs_shr_r(k->cx_q16, 3) + (1 << 8);
     h->cy_q13 = evs_shr_r(k->cy_q16, 3) + (1 << 8);

@@ -44,14 +44,13 @@ AVX2 static __m256i mul_hi(__m256i a, __m256i b)
 
 AVX2 size_t evs_homography_map_avx2(const evs_homography_t *h, const evs_point_t *in, size_t n, evs_point_t *out)
 {
-    const row_t row_w = make_row(h->wx_q38, h->wy_q38, h->w0_q26);
+    const row_t row_w = make_row(h->wx_q35, h->wy_q35, h->w0_q23);
     const row_t row_a = make_row(h->ax_q28, h->ay_q28, h->a0_q16);
     const row_t row_b = make_row(h->bx_q28, h->by_q28, h->b0_q16);
     const __m256i cx = _mm256_set1_epi32(h->cx_q13);
     const __m256i cy = _mm256_set1_epi32(h->cy_q13);
-    const __m256i marker = _mm256_set1_epi32((int32_t)UINT32_C(0x80008000));
+    const __m256i marker = _mm256_set1_epi32(MARKER);
     const __m256i most = _mm256_set1_epi32(EVS_POINT_MAX_Q4);
-    const __m256i sign = _mm256_set1_epi32(INT32_MIN);
 
     size_t i = 0u;
     for (; i + 8u <= n; i += 8u) {
@@ -64,10 +63,10 @@ AVX2 size_t evs_homography_map_avx2(const evs_homography_t *h, const evs_point_t
             for (size_t k = i; k < i + 8u; k++) { out[k] = map_fast(h, in[k]); }
             continue;
         }
-        const __m256i f = _mm256_xor_si256(_mm256_slli_epi32(w, 32 - W_CELL_BITS), sign);
         const __m256i value = _mm256_i32gather_epi32(&EVS_RECIP_Q29[0][0], cell, 8);
         const __m256i slope = _mm256_i32gather_epi32(&EVS_RECIP_Q29[0][1], cell, 8);
-        const __m256i r = _mm256_add_epi32(value, mul_hi(slope, f));
+        /* slope * f / 2^16 with f the signed low half of w: multiplied by f * 2^16, the upper half of the product. */
+        const __m256i r = _mm256_add_epi32(value, mul_hi(slope, _mm256_slli_epi32(w, 16)));
         const __m256i x = _mm256_srai_epi32(_mm256_add_epi32(cx, mul_hi(apply_row(row_a, xy), r)), 9);
         const __m256i y = _mm256_srai_epi32(_mm256_add_epi32(cy, mul_hi(apply_row(row_b, xy), r)), 9);
         const __m256i beyond = _mm256_or_si256(_mm256_cmpgt_epi32(_mm256_abs_epi32(x), most),

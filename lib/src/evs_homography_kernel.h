@@ -7,7 +7,7 @@
 #include "evs/homography.h"
 #include "evs_recip_table.h"
 
-#define W_CELL_BITS 18 /* Depth ratio Q26: 256 cells of 2^18 on [1/2, 3/2). */
+#define W_CELL_BITS 15 /* Depth ratio Q23: 256 cells of 2^15 on [1/2, 3/2). */
 
 #if !EVS_NO_SIMD && defined(__x86_64__) && defined(__GNUC__)
 #define EVS_HOMOGRAPHY_HAS_AVX2 1
@@ -51,6 +51,8 @@ static inline int32_t madw_high(int32_t acc, int32_t coef, int32_t packed)
 static inline int32_t add_mul_hi(int32_t acc, int32_t a, int32_t b) { return acc + evs_mul_hi(a, b); }
 #endif
 
+#define MARKER ((int32_t)UINT32_C(0x80008000)) /* EVS_POINT_OUTSIDE, packed */
+
 /* x in the low, y in the high half: how a point lies in memory on a little-endian core. */
 static inline int32_t pack_point(evs_point_t p)
 {
@@ -62,11 +64,10 @@ static inline evs_point_t map_fast(const evs_homography_t *h, evs_point_t p)
     const int32_t xy = pack_point(p);
 
     /* Depth ratio less 1/2; everything outside [1/2, 3/2) and the marker take the exact path. */
-    const uint32_t w_q26 = (uint32_t)madw_high(madw_low(h->w0_q26, h->wx_q38, xy), h->wy_q38, xy);
-    const uint32_t cell = w_q26 >> W_CELL_BITS;
-    if ((cell >= EVS_RECIP_CELLS) || evs_point_is_outside(p)) { return evs_homography_map_exact(h, p); }
-    const int32_t f_q32 = (int32_t)((w_q26 << (32 - W_CELL_BITS)) ^ UINT32_C(0x80000000));
-    const int32_t r_q29 = add_mul_hi(EVS_RECIP_Q29[cell][0], EVS_RECIP_Q29[cell][1], f_q32);
+    const int32_t w_q23 = madw_high(madw_low(h->w0_q23, h->wx_q35, xy), h->wy_q35, xy);
+    const uint32_t cell = (uint32_t)w_q23 >> W_CELL_BITS;
+    if ((cell >= EVS_RECIP_CELLS) || (xy == MARKER)) { return evs_homography_map_exact(h, p); }
+    const int32_t r_q29 = madw_low(EVS_RECIP_Q29[cell][0], EVS_RECIP_Q29[cell][1], w_q23);
 
     const int32_t a_q16 = madw_high(madw_low(h->a0_q16, h->ax_q28, xy), h->ay_q28, xy);
     const int32_t b_q16 = madw_high(madw_low(h->b0_q16, h->bx_q28, xy), h->by_q28, xy);

@@ -126,6 +126,30 @@ static size_t take(evs_window_t *win, const evs_event_t *ev, const uint16_t *til
     return taken;
 }
 
+/* Where the open window must end: limit_us after since_us. */
+static void time_limit(const evs_window_t *win, uint32_t *since_us, uint32_t *limit_us)
+{
+    const bool by_duration = win->cfg.kind == EVS_WINDOW_DURATION;
+    *since_us = by_duration ? win->cell_us : win->t_first_us;
+    *limit_us = by_duration ? win->cfg.duration_us : win->cfg.max_duration_us;
+}
+
+static evs_window_reason_t time_reason(const evs_window_t *win)
+{
+    return (win->cfg.kind == EVS_WINDOW_DURATION) ? EVS_WINDOW_BY_DURATION : EVS_WINDOW_BY_MAX_DURATION;
+}
+
+bool evs_window_expire(evs_window_t *win, uint32_t t_us, evs_window_end_t *end)
+{
+    EVS_ASSERT((win != NULL) && (end != NULL));
+    uint32_t since_us;
+    uint32_t limit_us;
+    time_limit(win, &since_us, &limit_us);
+    if ((win->n_events == 0u) || (t_us - since_us < limit_us)) { return false; }
+    close_window(win, time_reason(win), end);
+    return true;
+}
+
 size_t evs_window_push(evs_window_t *win, const evs_event_t *ev, const uint16_t *tiles, size_t n, evs_window_end_t *end)
 {
     EVS_ASSERT((win != NULL) && (end != NULL) && ((ev != NULL) || (n == 0u)));
@@ -137,8 +161,10 @@ size_t evs_window_push(evs_window_t *win, const evs_event_t *ev, const uint16_t 
         win->t_first_us = ev[0].t_us;
         if (by_duration) { enter_cell(win, ev[0].t_us); }
     }
-    const size_t fit = by_duration ? count_before(ev, n, win->cell_us, win->cfg.duration_us)
-                                   : count_before(ev, n, win->t_first_us, win->cfg.max_duration_us);
+    uint32_t since_us;
+    uint32_t limit_us;
+    time_limit(win, &since_us, &limit_us);
+    const size_t fit = count_before(ev, n, since_us, limit_us);
     bool closes = false;
     size_t taken = fit;
     if (!by_duration && (fit > 0u)) { taken = take(win, ev, tiles, fit, &closes); }
@@ -149,7 +175,7 @@ size_t evs_window_push(evs_window_t *win, const evs_event_t *ev, const uint16_t 
     if (closes) {
         close_window(win, (win->cfg.kind == EVS_WINDOW_AREA) ? EVS_WINDOW_BY_AREA : EVS_WINDOW_BY_COUNT, end);
     } else if ((taken == fit) && (fit < n)) {
-        close_window(win, by_duration ? EVS_WINDOW_BY_DURATION : EVS_WINDOW_BY_MAX_DURATION, end);
+        close_window(win, time_reason(win), end);
     }
     return taken;
 }

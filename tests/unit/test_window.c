@@ -228,6 +228,28 @@ static void test_duration_grid_skips_empty_cells_and_starts_at_the_first_event(v
     TEST_ASSERT_EQUAL_INT(EVS_WINDOW_OPEN, end.reason);
 }
 
+static void test_expire_closes_only_what_the_time_has_passed(void)
+{
+    evs_window_config_t cfg = config(EVS_WINDOW_COUNT, 10u);
+    cfg.max_duration_us = 100u;
+    init(&cfg);
+    evs_window_end_t end = {.n_events = 77u};
+    TEST_ASSERT_FALSE(evs_window_expire(&win, 5000u, &end)); /* nothing in it */
+    events[0] = evs_event_make(5000u, 0u, 0u, true);
+    TEST_ASSERT_EQUAL_UINT(1u, evs_window_push(&win, events, tiles, 1u, &end));
+    TEST_ASSERT_FALSE(evs_window_expire(&win, 5099u, &end));
+    TEST_ASSERT_TRUE(evs_window_expire(&win, 5100u, &end));
+    TEST_ASSERT_EQUAL_INT(EVS_WINDOW_BY_MAX_DURATION, end.reason);
+    TEST_ASSERT_EQUAL_UINT32(1u, end.n_events);
+
+    cfg.kind = EVS_WINDOW_DURATION;
+    cfg.duration_us = 100u;
+    init(&cfg);
+    TEST_ASSERT_EQUAL_UINT(1u, evs_window_push(&win, events, tiles, 1u, &end));
+    TEST_ASSERT_TRUE(evs_window_expire(&win, 5100u, &end));
+    TEST_ASSERT_EQUAL_INT(EVS_WINDOW_BY_DURATION, end.reason);
+}
+
 static void test_close_ends_a_window_that_holds_events_and_only_that(void)
 {
     const evs_window_config_t cfg = config(EVS_WINDOW_COUNT, 10u);
@@ -251,6 +273,7 @@ int main(void)
     RUN_TEST(test_area_closes_with_the_event_that_exceeds_the_threshold);
     RUN_TEST(test_every_kind_agrees_with_the_model_however_the_stream_is_split);
     RUN_TEST(test_duration_grid_skips_empty_cells_and_starts_at_the_first_event);
+    RUN_TEST(test_expire_closes_only_what_the_time_has_passed);
     RUN_TEST(test_close_ends_a_window_that_holds_events_and_only_that);
     return UNITY_END();
 }

@@ -6,9 +6,12 @@
     make_recip_table.py           print the header
     make_recip_table.py --check F compare it with the file F; exit 1 if they differ
 
-On a cell of width h = 1/256 around its middle m, with f = (w - m) / h in [-1/2, 1/2), the line is v + s f. The slope is
-that of the chord, the offset halves the error between chord and curve. Worst relative error: 2^-17, at w = 1/2.
-Everything is exact rational arithmetic but for one square root, which is rounded far below the table's last bit.
+On a cell [lo, hi) the line is v + s f / 2^16, f the distance of w from an edge in units of half the width of a cell pair:
+the kernel takes f as the low 16 bits of w (Q23), read as a signed number. Two cells share these 16 bits. In the even one
+they count up from its left edge, in the odd one they are negative and count down from its right edge; each entry holds
+the value at the edge that its f starts from. The slope is that of the chord, the offset halves the error between chord
+and curve. Worst relative error: 2^-17, at w = 1/2. Exact rational arithmetic but for one square root, which is rounded
+far below the table's last bit.
 """
 import sys
 from fractions import Fraction as F
@@ -31,8 +34,9 @@ def cell(i):
     touch = sqrt_fraction(lo * hi)
     f = (touch - (lo + hi) / 2) * CELLS
     deepest = middle_of_chord + s * f - 1 / touch
-    v = middle_of_chord - deepest / 2
-    return round(v * 2**Q), round(s * 2**Q)
+    middle = middle_of_chord - deepest / 2
+    edge = middle - s / 2 if i % 2 == 0 else middle + s / 2
+    return round(edge * 2**Q), round(2 * s * 2**Q)
 
 
 def header():
@@ -47,7 +51,7 @@ def header():
              "#define EVS_RECIP_CELLS 256",
              "",
              "/* clang-format off */",
-             "/* Value in the middle of each cell and slope across it, Q29. */",
+             "/* Value at the edge that the fraction starts from, and slope across two cells, Q29. */",
              "static const int32_t EVS_RECIP_Q29[EVS_RECIP_CELLS][2] = {"]
     cells = ["{%d, %d}" % cell(i) for i in range(CELLS)]
     for i in range(0, CELLS, 4):

@@ -36,8 +36,21 @@ typedef struct { /** Context; zero-initialize it. Every member is private. */
     bool started;
 } evs_clock_t;
 
+/** What is left to judge of a time that is not ahead; part of evs_clock_step(). */
+evs_clock_verdict_t evs_clock_refuse(evs_clock_t *clock, uint32_t t_us);
+
 /** Judge the next time of a stream. @param equal_ok  Whether a time equal to the newest is accepted. */
-evs_clock_verdict_t evs_clock_step(evs_clock_t *clock, uint32_t t_us, bool equal_ok);
+static inline evs_clock_verdict_t evs_clock_step(evs_clock_t *clock, uint32_t t_us, bool equal_ok)
+{
+    const int32_t ahead_us = evs_time_diff_us(t_us, clock->newest_us);
+    if ((ahead_us > 0) || (equal_ok && (ahead_us == 0)) || !clock->started) {
+        clock->started = true;
+        clock->newest_us = t_us;
+        clock->n_refused_run = 0u;
+        return EVS_CLOCK_FORWARD;
+    }
+    return evs_clock_refuse(clock, t_us);
+}
 
 #ifdef __cplusplus
 }

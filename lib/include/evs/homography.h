@@ -46,10 +46,10 @@ typedef struct { /** Context. A complete type only so that you can place it: eve
     int32_t fy_q16;
     int32_t cx_q16;
     int32_t cy_q16;
-    /* Fast path: numerators (Q28, Q16 px) and depth ratio (Q38, Q26), divided by the ratio at the image centre. */
+    /* Fast path: numerators (Q28, Q16 px) and depth ratio (Q35, Q23), divided by the ratio at the image centre. */
     int32_t ax_q28, ay_q28, a0_q16;
     int32_t bx_q28, by_q28, b0_q16;
-    int32_t wx_q38, wy_q38, w0_q26;
+    int32_t wx_q35, wy_q35, w0_q23;
     int32_t cx_q13, cy_q13;
     bool fast;
 } evs_homography_t;

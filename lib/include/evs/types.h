@@ -85,11 +85,12 @@ static inline int32_t evs_time_diff_us(uint32_t later_us, uint32_t earlier_us)
     return (int32_t)(later_us - earlier_us);
 }
 
-/** Add one to a fault counter that saturates instead of wrapping. */
-static inline void evs_count(uint32_t *counter)
+/** Add to a counter that saturates instead of wrapping. */
+static inline void evs_count_add(uint32_t *counter, size_t n)
 {
-    if (*counter < UINT32_MAX) { (*counter)++; }
+    *counter = (n < UINT32_MAX - *counter) ? *counter + (uint32_t)n : UINT32_MAX;
 }
+static inline void evs_count(uint32_t *counter) { evs_count_add(counter, 1u); }
 
 #ifdef __cplusplus
 }

@@ -101,6 +101,13 @@ size_t evs_window_push(evs_window_t *win, const evs_event_t *ev, const uint16_t 
                        evs_window_end_t *end);
 
 /**
+ * Close the open window if an event at @p t_us would be too late for it. For a loop that hears of time passing without
+ * events, or wants to know where the next event belongs.
+ * @return true when it closed; only then is @p end written.
+ */
+bool evs_window_expire(evs_window_t *win, uint32_t t_us, evs_window_end_t *end);
+
+/**
  * Close the open window, for the end of a stream or the restart of its clock; the duration grid starts anew.
  * @return true when the window held an event; only then is @p end written.
  */
