@@ -12,6 +12,7 @@ set(EVS_SOURCES
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_homography.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_homography_avx2.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_orientation_track.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_pipeline.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_stabilize.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_tiles.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_types.c
