@@ -72,10 +72,20 @@ set(memory_table ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/tests/support/memor
 evs_add_script_test(docs memory COMMAND ${memory_table} --check ${PROJECT_SOURCE_DIR}/docs/memory.md)
 set_tests_properties(docs.memory PROPERTIES FIXTURES_REQUIRED "tree_m0plus;tree_m4f;tree_m7;tree_m55;tree_rv32")
 
+set(bench_table ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/tests/bench/bench_table.py ${targets_root})
+set(update_performance "")
+if(TARGET evcount)
+  evs_add_script_test(docs performance COMMAND ${bench_table} $<TARGET_FILE:evcount>
+                      --check ${PROJECT_SOURCE_DIR}/docs/performance.md)
+  set_tests_properties(docs.performance PROPERTIES FIXTURES_REQUIRED "tree_m4f;tree_m7;tree_m55;tree_rv32")
+  set(update_performance COMMAND ${bench_table} $<TARGET_FILE:evcount> --write ${PROJECT_SOURCE_DIR}/docs/performance.md)
+endif()
+
 # Builds the targets and writes the numbers into docs/ again.
 add_custom_target(
   evs_update_docs
   COMMAND ${CMAKE_CTEST_COMMAND} --output-on-failure -R "^target[.][a-z0-9]+[.]build$"
   COMMAND ${memory_table} --write ${PROJECT_SOURCE_DIR}/docs/memory.md
+  ${update_performance}
   WORKING_DIRECTORY ${PROJECT_BINARY_DIR}
   USES_TERMINAL VERBATIM)

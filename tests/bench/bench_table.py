@@ -1,0 +1,108 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+# SPDX-FileCopyrightText: 2026 the evstab authors
+"""Instructions per event on the emulated targets, for docs/performance.md.
+
+usage: bench_table.py TREES PLUGIN [--write docs/performance.md | --check docs/performance.md]
+
+TREES holds the cross builds m4f m7 m55 rv32, PLUGIN is the built evcount.c;
+`cmake --build build/release --target evs_update_docs` makes both and calls this script. Without an option the table is
+printed. --check fails when a count has moved by more than 2 % or 1; it is skipped (status 77) if the compiler is
+another one than that of the document.
+"""
+import argparse
+import os
+import re
+import sys
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+sys.path.insert(0, os.path.join(HERE, "..", "support"))
+from count_insns import count  # noqa: E402
+from cross_tree import SKIP, Tree, compare_tables, read_section, replace_section  # noqa: E402
+
+TARGETS = {  # Tree: (column head, machine)
+    "m4f": ("Cortex-M4F", "mps2-an386"),
+    "m7": ("Cortex-M7", "mps2-an500"),
+    "m55": ("Cortex-M55", "mps3-an547"),
+    "rv32": ("RV32IMAC", "riscv32-virt"),
+}
+RUN_QEMU = os.path.join(HERE, "..", "target", "run_qemu.sh")
+PER_EVENT = [  # (row, regions that it adds up)
+    ("undistort, full table", ["LOOKUP_FULL"]),
+    ("undistort, full table, tile from table", ["LOOKUP_FULL_TILES"]),
+    ("undistort, grid of 8 px", ["LOOKUP_GRID"]),
+    ("undistort, grid of 8 px, tile computed", ["LOOKUP_GRID_TILES"]),
+    ("window, area count", ["WINDOW"]),
+    ("rotation", ["ROTATE"]),
+    ("**all: full table + window + rotation**", ["LOOKUP_FULL_TILES", "WINDOW", "ROTATE"]),
+    ("**all: grid + window + rotation**", ["LOOKUP_GRID_TILES", "WINDOW", "ROTATE"]),
+]
+PER_CALL = [("new orientation, once per slice of at most 1 ms", "SLICE")]
+
+
+def constants():
+    with open(os.path.join(HERE, "bench_regions.h"), encoding="utf-8") as f:
+        return {name: int(value) for name, value in re.findall(r"BENCH_(\w+) = (\d+)", f.read())}
+
+
+def table(head, rows):
+    lines = ["| " + " | ".join(head) + " |", "|---" + "|--:" * (len(head) - 1) + "|"]
+    lines += ["| " + " | ".join(row) + " |" for row in rows]
+    return "\n".join(lines) + "\n"
+
+
+def generate(trees, plugin):
+    number = constants()
+    counts = {}
+    for tree in trees:
+        image = os.path.join(tree.path, "tests", "bench", "bench_events")
+        counts[tree.name], _ = count(plugin, RUN_QEMU, TARGETS[tree.name][1], image)
+
+    def per_call(name, tree):
+        calls, insns = counts[tree.name][number[name]]
+        if calls != number["BATCHES"]:
+            raise SystemExit(f"{tree.name}: {name} ran {calls} times, not {number['BATCHES']}")
+        return insns / calls
+
+    names = [TARGETS[tree.name][0] for tree in trees]
+    rows = [[row] + [f"{sum(per_call(r, t) for r in regions) / number['EVENTS']:.1f}" for t in trees]
+            for row, regions in PER_EVENT]
+    out = "Instructions per event:\n\n" + table(["step"] + names, rows)
+    rows = [[row] + [f"{per_call(region, t):.0f}" for t in trees] for row, region in PER_CALL]
+    return out + "\nInstructions per call:\n\n" + table(["step"] + names, rows)
+
+
+def main():
+    parser = argparse.ArgumentParser(description="Instructions per event on the emulated targets.")
+    parser.add_argument("trees")
+    parser.add_argument("plugin")
+    group = parser.add_mutually_exclusive_group()
+    group.add_argument("--write", metavar="FILE")
+    group.add_argument("--check", metavar="FILE")
+    args = parser.parse_args()
+
+    trees = [Tree(args.trees, name) for name in TARGETS]
+    versions = ", ".join(f"{os.path.basename(t.compiler())} {t.compiler_version()}" for t in (trees[0], trees[-1]))
+    stamp = f"Compilers: {versions}; `-O2`.\n\n"
+    if args.check and not read_section(args.check, "performance").startswith(stamp):
+        print(f"skipped: {args.check} was made with other compilers than {versions}")
+        return SKIP
+    section = stamp + generate(trees, args.plugin)
+    if args.write:
+        content = replace_section(args.write, "performance", section)
+        with open(args.write, "w", encoding="utf-8") as f:
+            f.write(content)
+    elif args.check:
+        documented = read_section(args.check, "performance")
+        complaints = compare_tables(documented, section, lambda a, b: abs(a - b) <= max(1, 0.02 * a))
+        if complaints:
+            print(f"{args.check} is not what is counted:", *complaints, sep="\n  ")
+            print("If the change is meant: cmake --build build/release --target evs_update_docs")
+            return 1
+    else:
+        print(section, end="")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
