@@ -46,7 +46,7 @@ foreach(target IN ITEMS m0plus m4f m33 rv32) # The others multiply doubles in ha
   evs_add_tree_test(${target} symbols.refuses_double)
 endforeach()
 foreach(target IN LISTS targets_with_board)
-  foreach(test IN ITEMS board.check board.assert board.fault ${portable_tests})
+  foreach(test IN ITEMS board.check board.assert board.fault docs.examples ${portable_tests})
     evs_add_tree_test(${target} ${test})
   endforeach()
 endforeach()
