@@ -11,6 +11,7 @@ static const struct {
     const char *summary;
     int (*run)(int argc, char **argv);
 } COMMANDS[] = {
+    {"lut", "the undistortion table of a camera as a C header for flash", evt_lut_main},
     {"info", "what a file or a folder holds, and what is wrong with it", evt_info_main},
 };
 
