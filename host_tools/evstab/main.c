@@ -11,6 +11,8 @@ static const struct {
     const char *summary;
     int (*run)(int argc, char **argv);
 } COMMANDS[] = {
+    {"replay", "a recording through the library: stabilized events, windows, attitude", evt_replay_main},
+    {"attitude", "the attitude filter alone, on the samples of an IMU", evt_attitude_main},
     {"lut", "the undistortion table of a camera as a C header for flash", evt_lut_main},
     {"info", "what a file or a folder holds, and what is wrong with it", evt_info_main},
 };

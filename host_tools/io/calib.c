@@ -18,8 +18,12 @@ bool evh_calib_check(const evh_calib_t *calib, const char *path, evh_error_t *er
 {
     if (!(calib->fx_px >= FOCAL_MIN_PX) || !(calib->fy_px >= FOCAL_MIN_PX) || !(calib->fx_px <= FOCAL_MAX_PX) ||
         !(calib->fy_px <= FOCAL_MAX_PX)) {
-        return evh_fail(err, "%s: focal length fx %g, fy %g; it is given in pixels and must lie in 1 .. %g", path,
-                        calib->fx_px, calib->fy_px, FOCAL_MAX_PX);
+        return evh_fail(err, "%s: focal length fx %g, fy %g; it is given in pixels and must lie in %g .. %g", path,
+                        calib->fx_px, calib->fy_px, FOCAL_MIN_PX, FOCAL_MAX_PX);
+    }
+    if (!(calib->fx_px < 2.0 * calib->fy_px) || !(calib->fy_px < 2.0 * calib->fx_px)) {
+        return evh_fail(err, "%s: focal lengths fx %g and fy %g differ by more than a factor of 2, which no lens does",
+                        path, calib->fx_px, calib->fy_px);
     }
     if (!(fabs(calib->cx_px) <= CENTRE_MAX_PX) || !(fabs(calib->cy_px) <= CENTRE_MAX_PX)) {
         return evh_fail(err, "%s: principal point cx %g, cy %g; it is given in pixels and must lie near the sensor",

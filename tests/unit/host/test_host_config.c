@@ -105,7 +105,7 @@ static void test_bad_values_name_line_key_and_expectation(void)
         {"accumulation_type: aera\n",
          "test.yaml: line 1: accumulation_type is 'aera'; expected area, number_of_events or time"},
         {"K: [0, 0, 120, 0, 200, 90, 0, 0, 1]\n",
-         "test.yaml: focal length fx 0, fy 200; it is given in pixels and must lie in 1 .. 16383"},
+         "test.yaml: focal length fx 0, fy 200; it is given in pixels and must lie in 8 .. 8192"},
         {"K: [200, 0, nan, 0, 200, 90, 0, 0, 1]\n", "test.yaml: line 1: K is 'nan'; expected numbers"},
         {"q_external: [0, 0, 0, 0]\n",
          "test.yaml: line 1: q_external has length 0; expected a unit quaternion [qx, qy, qz, qw]"},

@@ -1,0 +1,151 @@
+/* SPDX-License-Identifier: MIT
+ * SPDX-FileCopyrightText: 2026 the evstab authors */
+/* evstab attitude: the attitude filter alone. One output row per input row, so that outputs line up with whatever else
+ * the user has per row: a row that cannot be used repeats the last orientation, and is counted. */
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "command.h"
+#include "csv_writer.h"
+#include "evs/attitude.h"
+#include "imu_feed.h"
+#include "options.h"
+#include "progress.h"
+#include "recording.h"
+
+static const char *opt_out;
+static const char *opt_mode;
+static bool opt_quiet;
+
+static const evt_option_t OPTIONS[] = {
+    {"output", 'o', "Q.csv", "Where the orientations go. Needed.", &opt_out, NULL},
+    {"mode", '\0', "MODE",
+     "filter (default), gyro (integration alone) or valenti\n(the published complementary filter).", &opt_mode, NULL},
+    {"quiet", 'q', NULL, "No progress and no notes.", NULL, &opt_quiet},
+};
+
+static const evt_usage_t USAGE = {
+    .command = "attitude",
+    .synopsis = "IMU.csv -o Q.csv [options]",
+    .about = "Runs the attitude filter on the samples of an IMU. The header of IMU.csv (plain or .gz) names the "
+             "columns, in any\n"
+             "order, further ones are ignored:\n"
+             "  t_s,gx_rad_s,gy_rad_s,gz_rad_s,ax_m_s2,ay_m_s2,az_m_s2[,mx_ut,my_ut,mz_ut]\n"
+             "Q.csv gets one row per input row: t_s,qw,qx,qy,qz, from the sensor to the earth (x east, y north, z up; "
+             "without\n"
+             "a magnetometer the heading starts at 0). A row that cannot be used repeats the last orientation.",
+    .examples = "  evstab attitude imu.csv -o q.csv\n  evstab attitude imu.csv.gz -o q.csv --mode gyro",
+    .options = OPTIONS,
+    .n_options = sizeof OPTIONS / sizeof OPTIONS[0],
+    .n_words_min = 1u,
+    .n_words_max = 1u,
+};
+
+static void feed_gyro(void *f, uint32_t t_us, evs_vec3_t v) { evs_attitude_push_gyro(f, t_us, v); }
+static void feed_accel(void *f, uint32_t t_us, evs_vec3_t v) { evs_attitude_push_accel(f, t_us, v); }
+static void feed_mag(void *f, uint32_t t_us, evs_vec3_t v) { evs_attitude_push_mag(f, t_us, v); }
+
+static void put_row(evh_csv_t *out, int64_t t_us, evs_quat_t q)
+{
+    const int32_t part[4] = {q.w, q.x, q.y, q.z};
+    char *p = evh_csv_reserve(out, 128u);
+    p = evh_put_time_us(p, t_us);
+    for (int i = 0; i < 4; i++) {
+        *p++ = ',';
+        p = evh_put_q(p, part[i], 30u, 9u);
+    }
+    *p++ = '\n';
+    evh_csv_advance(out, p);
+}
+
+static void report_faults(evs_attitude_faults_t f)
+{
+    char text[256];
+    const int n =
+        snprintf(text, sizeof text,
+                 "gyro clipped %" PRIu32 ", spikes %" PRIu32 ", gaps %" PRIu32 "; accelerations left out %" PRIu32
+                 ", fields left out %" PRIu32 ", times left out %" PRIu32,
+                 f.n_gyro_saturated, f.n_gyro_spikes, f.n_gyro_gaps, f.n_accel_bad, f.n_mag_bad, f.n_time_bad);
+    if ((n > 0) &&
+        ((f.n_gyro_saturated | f.n_gyro_spikes | f.n_gyro_gaps | f.n_accel_bad | f.n_mag_bad | f.n_time_bad) != 0u)) {
+        evh_note("the filter saw: %s", text);
+    }
+}
+
+static bool run(evh_imu_t *imu, evs_attitude_t *att, evh_csv_t *out, uint64_t *n_rows, evh_error_t *err)
+{
+    evt_imu_feed_t feed = {att, feed_gyro, feed_accel, feed_mag, false};
+    evh_imu_sample_t s;
+    evt_progress_t progress;
+    int64_t t_us = 0;
+    evt_progress_start(&progress);
+    while (evh_imu_next_any(imu, &s, err)) {
+        if (s.has_time) { t_us = s.t_us; }
+        if (s.fault == EVH_FAULT_NONE) { evt_imu_feed(&feed, &s); }
+        put_row(out, t_us, evs_attitude_orientation(att));
+        *n_rows += 1u;
+        evt_progress_update(&progress, evh_lines_fraction(&imu->rows.lines), *n_rows, "samples");
+    }
+    evt_progress_end(&progress);
+    return err->text[0] == '\0';
+}
+
+static bool attitude(const char *in_path, const char *out_path, evs_attitude_mode_t mode, evh_error_t *err)
+{
+    evs_attitude_config_t config = evs_attitude_config_default();
+    evs_attitude_t att;
+    evh_imu_t imu;
+    evh_csv_t out;
+    uint64_t n_rows = 0u;
+    bool ok;
+
+    config.mode = mode;
+    if (evs_attitude_init(&att, &config) != EVS_OK) { return evh_fail(err, "the filter refuses its own defaults"); }
+    if (!evh_imu_open_named(&imu, in_path, err)) { return false; }
+    if (!imu.rows.has_ahead) {
+        evh_imu_close(&imu);
+        return evh_fail(err, "%s: holds no sample", in_path);
+    }
+    if (!evh_csv_open_path(&out, out_path, "t_s,qw,qx,qy,qz", err)) {
+        evh_imu_close(&imu);
+        return false;
+    }
+    ok = run(&imu, &att, &out, &n_rows, err);
+    ok = evh_csv_close(&out, err) && ok;
+    evh_tally_report(&imu.rows.tally, evh_path_name(in_path));
+    if (ok && (imu.rows.tally.n_good == 0u)) { ok = evh_fail(err, "%s: holds no usable sample", in_path); }
+    if (ok) {
+        report_faults(evs_attitude_faults(&att));
+        (void)printf("%s: %" PRIu64 " rows, %" PRIu64 " of them repeat the last orientation\n", out_path, n_rows,
+                     evh_tally_skipped(&imu.rows.tally));
+    }
+    evh_imu_close(&imu);
+    return ok;
+}
+
+int evt_attitude_main(int argc, char **argv)
+{
+    static const char *const MODES[] = {"filter", "gyro", "valenti"};
+    static const evs_attitude_mode_t MODE_VALUES[] = {EVS_ATTITUDE_FILTER, EVS_ATTITUDE_GYRO_ONLY,
+                                                      EVS_ATTITUDE_VALENTI};
+    const char *words[1];
+    evh_error_t err = {""};
+    size_t mode = 0u;
+    int status = EVT_EXIT_OK;
+
+    if (!evt_options_parse(&USAGE, argc, argv, words, &status)) { return status; }
+    if (opt_out == NULL) { return evt_usage_error(&USAGE, "-o Q.csv is missing: where the orientations shall go"); }
+    if (opt_mode != NULL) {
+        while ((mode < 3u) && (strcmp(opt_mode, MODES[mode]) != 0)) { mode++; }
+        if (mode == 3u) {
+            return evt_usage_error(&USAGE, "--mode is '%s'; expected filter, gyro or valenti", opt_mode);
+        }
+    }
+    evh_set_quiet(opt_quiet);
+    if (!attitude(words[0], opt_out, MODE_VALUES[mode], &err)) {
+        (void)fprintf(stderr, "evstab attitude: %s\n", err.text);
+        return EVT_EXIT_FAILED;
+    }
+    return EVT_EXIT_OK;
+}

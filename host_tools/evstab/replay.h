@@ -1,0 +1,97 @@
+/* SPDX-License-Identifier: MIT
+ * SPDX-FileCopyrightText: 2026 the evstab authors */
+/**
+ * @file  replay.h
+ * @brief evstab replay, in four parts: settings from the command line and files, the run, the output files, the
+ * summary.
+ */
+#ifndef EVT_REPLAY_H
+#define EVT_REPLAY_H
+
+#include "config_yaml.h"
+#include "csv_writer.h"
+#include "event_source.h"
+#include "evs/pipeline.h"
+#include "imu_text.h"
+#include "poses_text.h"
+#include "recording.h"
+
+typedef enum { EVT_ATTITUDE_NONE = 0, EVT_ATTITUDE_IMU, EVT_ATTITUDE_GYRO, EVT_ATTITUDE_TRUTH } evt_attitude_t;
+
+/** What the command line said; NULL or false where it said nothing. */
+typedef struct {
+    const char *input;
+    const char *output;
+    const char *calib, *imu, *poses, *config;
+    const char *size, *imu_order;
+    const char *attitude, *window, *rotation, *saccade;
+    const char *imu_offset, *from, *to, *write;
+    bool paper;
+} evt_replay_options_t;
+
+/** What will be done: every default resolved. */
+typedef struct {
+    evh_recording_t rec;
+    evh_calib_t calib; /**< With the sensor size that counts. */
+    evt_attitude_t attitude;
+    evh_imu_order_t imu_order;
+    evs_pipeline_config_t pipeline;
+    int64_t from_us, to_us; /**< Events in [from, to). */
+    bool write_events;
+} evt_replay_t;
+
+/**
+ * The command line checked and completed by the files that it names.
+ * @param[out] usage_fault  Set when the fault is in the words themselves (exit status 2), not in the files.
+ */
+bool evt_replay_settle(evt_replay_t *r, const evt_replay_options_t *options, bool *usage_fault, evh_error_t *err);
+void evt_replay_free(evt_replay_t *r);
+
+const char *evt_attitude_name(evt_attitude_t attitude);
+
+/** What happened, for the summary. */
+typedef struct {
+    uint64_t n_before_from, n_after_to;
+    uint64_t n_events;         /**< Given to the library. */
+    uint64_t n_out;            /**< Came out of it again. */
+    uint64_t n_kept;           /**< Have a stabilized position. */
+    uint64_t n_no_undistorted; /**< The lens model reaches no such pixel. */
+    uint64_t n_unoriented;
+    uint64_t n_out_of_range; /**< Rotated out of what a point can hold, or behind the camera. */
+    uint64_t n_windows, n_saccades;
+    uint64_t n_orientations;
+    int64_t t_first_us, t_last_us;
+    int64_t orientation_first_us, orientation_last_us; /**< By the events' clock. */
+    int64_t library_ns, wall_ns;
+    evh_tally_t events_tally, imu_tally, poses_tally;
+    evs_pipeline_counts_t counts;
+    evs_attitude_faults_t attitude_faults;
+} evt_replay_result_t;
+
+/** The output files of a run. */
+typedef struct {
+    evh_csv_t attitude, windows, events;
+    bool has_attitude, has_windows, has_events;
+    uint64_t n_events; /**< Written so far: the first_event of the next window. */
+    uint64_t window_first_event;
+    bool window_saccade;
+} evt_replay_output_t;
+
+bool evt_replay_output_open(evt_replay_output_t *out, const evt_replay_t *r, const char *dir, evh_error_t *err);
+void evt_replay_put_orientation(evt_replay_output_t *out, int64_t t_us, const evs_orientation_t *o, uint32_t flags);
+/** @param t_us  Host time of each event of the chunk; t_first_us, t_last_us those of the window, when it ends here. */
+void evt_replay_put_chunk(evt_replay_output_t *out, const evs_pipeline_chunk_t *chunk, const int64_t *t_us,
+                          int64_t t_first_us, int64_t t_last_us);
+bool evt_replay_output_close(evt_replay_output_t *out, evh_error_t *err);
+
+/** Run it all. @p result is filled as far as the run came, also when it fails. */
+bool evt_replay_run(const evt_replay_t *r, const char *dir, evt_replay_result_t *result, evh_error_t *err);
+
+/** summary.json. @param failure  Text of what ended the run early, or NULL. */
+bool evt_replay_write_summary(const evt_replay_t *r, const evt_replay_options_t *options,
+                              const evt_replay_result_t *result, const char *dir, const char *failure,
+                              evh_error_t *err);
+
+const char *evt_window_reason_name(evs_window_reason_t reason);
+
+#endif

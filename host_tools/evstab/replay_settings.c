@@ -1,0 +1,326 @@
+/* SPDX-License-Identifier: MIT
+ * SPDX-FileCopyrightText: 2026 the evstab authors */
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "decimal.h"
+#include "detect.h"
+#include "evs/float.h"
+#include "options.h"
+#include "replay.h"
+#include "to_device.h"
+
+#define DEFAULT_WIDTH_PX  240u /* The DAVIS240C of the Event Camera Dataset. */
+#define DEFAULT_HEIGHT_PX 180u
+
+/* Room to work in. The output does not depend on it: orientations are always pushed ahead of the events. */
+#define N_FIFO  16384u
+#define N_RING  1024u
+#define N_BATCH 1024u
+
+#define IMU_OFFSET_MAX_US 10000000
+
+static const char *const ATTITUDES[] = {[EVT_ATTITUDE_NONE] = "none",
+                                        [EVT_ATTITUDE_IMU] = "imu",
+                                        [EVT_ATTITUDE_GYRO] = "gyro",
+                                        [EVT_ATTITUDE_TRUTH] = "truth"};
+
+const char *evt_attitude_name(evt_attitude_t attitude) { return ATTITUDES[attitude]; }
+
+/* "area:34x26:200", "count:30000", "time:10000" */
+static bool parse_window(const char *text, evs_pipeline_config_t *p)
+{
+    char size[24];
+    int64_t value = 0;
+    if (strncmp(text, "count:", 6u) == 0) {
+        if (!evt_parse_int(text + 6, 1, EVS_WINDOW_COUNT_MAX, &value)) { return false; }
+        p->window.kind = EVS_WINDOW_COUNT;
+        p->window.threshold = (uint32_t)value;
+        return true;
+    }
+    if (strncmp(text, "time:", 5u) == 0) {
+        if (!evt_parse_int(text + 5, 1, EVS_WINDOW_DURATION_MAX_US, &value)) { return false; }
+        p->window.kind = EVS_WINDOW_DURATION;
+        p->window.duration_us = (uint32_t)value;
+        return true;
+    }
+    if (strncmp(text, "area:", 5u) == 0) {
+        const size_t length = strcspn(text + 5, ":");
+        if ((length >= sizeof size) || (text[5u + length] != ':')) { return false; }
+        memcpy(size, text + 5, length);
+        size[length] = '\0';
+        if (!evt_parse_size(size, &p->n_cols, &p->n_rows) ||
+            !evt_parse_int(text + 6u + length, 1, EVS_WINDOW_AREA_MAX, &value)) {
+            return false;
+        }
+        p->window.kind = EVS_WINDOW_AREA;
+        p->window.threshold = (uint32_t)value;
+        return true;
+    }
+    return false;
+}
+
+static void apply_config_window(const evh_config_t *c, evs_pipeline_config_t *p)
+{
+    if (c->has_columns) { p->n_cols = (uint16_t)c->n_columns; }
+    if (c->has_rows) { p->n_rows = (uint16_t)c->n_rows; }
+    switch (c->window_kind) {
+    case EVH_WINDOW_COUNT:
+        p->window.kind = EVS_WINDOW_COUNT;
+        break;
+    case EVH_WINDOW_TIME:
+        p->window.kind = EVS_WINDOW_DURATION;
+        break;
+    case EVH_WINDOW_AREA:
+        p->window.kind = EVS_WINDOW_AREA;
+        break;
+    case EVH_WINDOW_UNSET:
+        break;
+    }
+    if ((p->window.kind == EVS_WINDOW_AREA) && c->has_roi_threshold) {
+        p->window.threshold =
+            (uint32_t)((c->roi_threshold > EVS_WINDOW_AREA_MAX) ? EVS_WINDOW_AREA_MAX : c->roi_threshold);
+    }
+    if ((p->window.kind == EVS_WINDOW_COUNT) && c->has_count) { p->window.threshold = (uint32_t)c->n_events; }
+    if ((p->window.kind == EVS_WINDOW_DURATION) && c->has_window_time) {
+        p->window.duration_us = (uint32_t)c->window_time_us;
+    }
+}
+
+/* The published settings: rotation once per window, 34 x 26 tiles, the threshold of the paper's three sensors, saccades
+ * at W / 6. */
+static void apply_paper(evs_pipeline_config_t *p, uint16_t width_px, uint16_t height_px)
+{
+    static const struct {
+        uint16_t width_px, height_px;
+        uint32_t threshold;
+    } PUBLISHED[] = {{240u, 180u, 200u}, {346u, 260u, 50u}, {640u, 480u, 500u}};
+    bool found = false;
+    p->stabilize.rotation = EVS_ROTATION_WINDOW;
+    p->window.kind = EVS_WINDOW_AREA;
+    p->window.threshold = PUBLISHED[0].threshold;
+    p->n_cols = 34u;
+    p->n_rows = 26u;
+    for (size_t i = 0u; i < sizeof PUBLISHED / sizeof PUBLISHED[0]; i++) {
+        if ((PUBLISHED[i].width_px == width_px) && (PUBLISHED[i].height_px == height_px)) {
+            p->window.threshold = PUBLISHED[i].threshold;
+            found = true;
+        }
+    }
+    if (!found) {
+        evh_note("--paper: no threshold is published for %ux%u; that of 240x180 is taken: 200", (unsigned)width_px,
+                 (unsigned)height_px);
+    }
+}
+
+static bool usage(bool *usage_fault, evh_error_t *err, const char *option, const char *text, const char *expected)
+{
+    *usage_fault = true;
+    return evh_fail(err, "%s is '%s'; expected %s", option, text, expected);
+}
+
+static bool settle_calib(evt_replay_t *r, const evt_replay_options_t *o, const evh_config_t *config, bool *usage_fault,
+                         evh_error_t *err)
+{
+    evh_kind_t kind = EVH_KIND_CALIB;
+    uint16_t width_px = 0u;
+    uint16_t height_px = 0u;
+    if ((o->size != NULL) && !evt_parse_size(o->size, &width_px, &height_px)) {
+        return usage(usage_fault, err, "--size", o->size, "WIDTHxHEIGHT, such as 240x180, up to 2048x2048");
+    }
+    if ((o->calib != NULL) && !evh_detect(o->calib, &kind, err)) { return false; }
+    if (kind == EVH_KIND_CONFIG) {
+        evh_config_t other;
+        if (!evh_config_read(&other, o->calib, err)) { return false; }
+        if (!other.has_calib) {
+            return evh_fail(err, "%s: no camera in it; needed are K and D, or intrinsics", o->calib);
+        }
+        r->calib = other.calib;
+    } else if ((o->calib != NULL) || (!config->has_calib && (r->rec.calib != NULL))) {
+        if (!evh_calib_text_read(&r->calib, r->rec.calib, err)) { return false; }
+        r->calib.width_px = config->calib.width_px; /* A size without K still helps. */
+        r->calib.height_px = config->calib.height_px;
+    } else if (config->has_calib) {
+        r->calib = config->calib;
+    } else {
+        return evh_fail(
+            err,
+            "%s: no calibration; give --calib FILE (fx fy cx cy k1 k2 p1 p2 k3) or --config FILE.yaml with K and D",
+            o->input);
+    }
+    if (o->size != NULL) {
+        r->calib.width_px = width_px;
+        r->calib.height_px = height_px;
+    } else if ((r->calib.width_px == 0u) || (r->calib.height_px == 0u)) {
+        r->calib.width_px = DEFAULT_WIDTH_PX;
+        r->calib.height_px = DEFAULT_HEIGHT_PX;
+        evh_note("no file says the sensor size: %ux%u is taken; --size says otherwise", DEFAULT_WIDTH_PX,
+                 DEFAULT_HEIGHT_PX);
+    }
+    return true;
+}
+
+static bool settle_attitude(evt_replay_t *r, const evt_replay_options_t *o, const evh_config_t *config,
+                            bool *usage_fault, evh_error_t *err)
+{
+    const bool has_imu = (r->rec.imu != NULL);
+    const bool has_poses = (r->rec.poses != NULL);
+    if (o->attitude != NULL) {
+        int i = 0;
+        while ((i < 4) && (strcmp(ATTITUDES[i], o->attitude) != 0)) { i++; }
+        if (i == 4) { return usage(usage_fault, err, "--attitude", o->attitude, "imu, gyro, truth or none"); }
+        r->attitude = (evt_attitude_t)i;
+    } else {
+        const bool prefer_truth = config->has_from_imu && !config->from_imu && has_poses;
+        r->attitude = (has_imu && !prefer_truth) ? EVT_ATTITUDE_IMU
+                      : has_poses                ? EVT_ATTITUDE_TRUTH
+                                                 : EVT_ATTITUDE_NONE;
+        evh_note("attitude: %s", (r->attitude == EVT_ATTITUDE_IMU) ? "imu"
+                                 : (r->attitude == EVT_ATTITUDE_TRUTH)
+                                     ? "truth (the recorded poses)"
+                                     : "none (no IMU and no poses): nothing is rotated");
+    }
+    if (((r->attitude == EVT_ATTITUDE_IMU) || (r->attitude == EVT_ATTITUDE_GYRO)) && !has_imu) {
+        return evh_fail(err, "%s: no IMU file; give --imu FILE, or --attitude truth or none", o->input);
+    }
+    if ((r->attitude == EVT_ATTITUDE_TRUTH) && !has_poses) {
+        return evh_fail(err, "%s: no pose file; give --poses FILE, or --attitude imu or none", o->input);
+    }
+    r->pipeline.source = (r->attitude == EVT_ATTITUDE_NONE)    ? EVS_PIPELINE_NONE
+                         : (r->attitude == EVT_ATTITUDE_TRUTH) ? EVS_PIPELINE_ORIENTATION
+                                                               : EVS_PIPELINE_IMU;
+    if (r->attitude == EVT_ATTITUDE_GYRO) { r->pipeline.attitude.mode = EVS_ATTITUDE_GYRO_ONLY; }
+    return true;
+}
+
+static bool settle_times(evt_replay_t *r, const evt_replay_options_t *o, bool *usage_fault, evh_error_t *err)
+{
+    int64_t offset_us = 0;
+    r->from_us = INT64_MIN;
+    r->to_us = INT64_MAX;
+    if ((o->imu_offset != NULL) && !evt_parse_int(o->imu_offset, -IMU_OFFSET_MAX_US, IMU_OFFSET_MAX_US, &offset_us)) {
+        return usage(usage_fault, err, "--imu-offset-us", o->imu_offset, "whole microseconds, -10000000 .. 10000000");
+    }
+    r->pipeline.track.offset_us = (int32_t)offset_us;
+    if ((o->from != NULL) && !evt_parse_seconds(o->from, &r->from_us)) {
+        return usage(usage_fault, err, "--from", o->from, "seconds of the recording's own clock, such as 12.5");
+    }
+    if ((o->to != NULL) && !evt_parse_seconds(o->to, &r->to_us)) {
+        return usage(usage_fault, err, "--to", o->to, "seconds of the recording's own clock, such as 12.5");
+    }
+    if (r->from_us >= r->to_us) { return usage(usage_fault, err, "--from", o->from, "less than --to"); }
+    return true;
+}
+
+static bool settle_window(evt_replay_t *r, const evt_replay_options_t *o, const evh_config_t *config, bool *usage_fault,
+                          evh_error_t *err)
+{
+    evs_pipeline_config_t *const p = &r->pipeline;
+    bool on = true;
+    if (o->paper) { apply_paper(p, r->calib.width_px, r->calib.height_px); }
+    apply_config_window(config, p);
+    if ((o->window != NULL) && !parse_window(o->window, p)) {
+        return usage(usage_fault, err, "--window", o->window,
+                     "area:COLSxROWS:EVENTS, count:EVENTS or time:MICROSECONDS");
+    }
+    if ((p->n_cols > r->calib.width_px) || (p->n_rows > r->calib.height_px) ||
+        ((uint32_t)p->n_cols * p->n_rows > EVS_TILES_MAX)) {
+        return evh_fail(err, "%ux%u tiles do not fit a sensor of %ux%u (at most %u in all)", (unsigned)p->n_cols,
+                        (unsigned)p->n_rows, (unsigned)r->calib.width_px, (unsigned)r->calib.height_px,
+                        (unsigned)EVS_TILES_MAX);
+    }
+    if (o->rotation != NULL) {
+        if ((strcmp(o->rotation, "window") != 0) && (strcmp(o->rotation, "slice") != 0)) {
+            return usage(usage_fault, err, "--rotation", o->rotation, "window or slice");
+        }
+        p->stabilize.rotation = (o->rotation[0] == 'w') ? EVS_ROTATION_WINDOW : EVS_ROTATION_SLICE;
+    }
+    if (config->has_saccades) { on = config->saccades; }
+    if ((o->saccade != NULL) && !evt_parse_on_off(o->saccade, &on)) {
+        return usage(usage_fault, err, "--saccade", o->saccade, "on or off");
+    }
+    if (!on) { p->stabilize.saccade_px_q4 = EVS_STABILIZE_SACCADE_OFF; }
+    return true;
+}
+
+static bool settle_write(evt_replay_t *r, const evt_replay_options_t *o, bool *usage_fault, evh_error_t *err)
+{
+    if (o->write == NULL) { return true; }
+    if (strcmp(o->write, "events") != 0) { return usage(usage_fault, err, "--write", o->write, "events"); }
+    r->write_events = true;
+    return true;
+}
+
+static void settle_pipeline(evt_replay_t *r, const evh_config_t *config)
+{
+    const evs_camera_config_t camera = evt_camera_config(&r->calib, r->calib.width_px, r->calib.height_px);
+    evs_pipeline_config_t *const p = &r->pipeline;
+    *p = evs_pipeline_config_default(&camera);
+    p->tile_table = true; /* Same numbers, less time. */
+    p->n_fifo = N_FIFO;
+    p->n_ring = N_RING;
+    p->n_batch = N_BATCH;
+    if (config->has_q_ci) {
+        evs_quat_t unit;
+        const double *const q = config->q_ci_wxyz;
+        if (evs_quat_normalize(evs_quat_from_double(q[0], q[1], q[2], q[3]), &unit) == EVS_OK) { p->q_ci = unit; }
+    }
+}
+
+static bool settle(evt_replay_t *r, const evt_replay_options_t *o, bool *usage_fault, evh_error_t *err)
+{
+    evh_config_t config;
+    const char *config_path;
+    memset(&config, 0, sizeof config);
+    if ((o->imu_order != NULL) && !evh_imu_order_parse(o->imu_order, &r->imu_order)) {
+        return usage(usage_fault, err, "--imu-order", o->imu_order,
+                     "accel-first, gyro-first or columns such as t,gx,gy,gz,ax,ay,az");
+    }
+    if (!evh_recording_find(&r->rec, o->input, err) || !evh_recording_override(&r->rec.calib, o->calib, err) ||
+        !evh_recording_override(&r->rec.imu, o->imu, err) || !evh_recording_override(&r->rec.poses, o->poses, err)) {
+        return false;
+    }
+    if (r->rec.events == NULL) {
+        return evh_fail(err, "%s: no events in this folder; expected events.txt or events.txt.gz", o->input);
+    }
+    config_path = (o->config != NULL) ? o->config : r->rec.config;
+    if ((config_path != NULL) && !evh_config_read(&config, config_path, err)) { return false; }
+    if (!settle_calib(r, o, &config, usage_fault, err)) { return false; }
+    settle_pipeline(r, &config);
+    return settle_attitude(r, o, &config, usage_fault, err) && settle_times(r, o, usage_fault, err) &&
+           settle_window(r, o, &config, usage_fault, err) && settle_write(r, o, usage_fault, err);
+}
+
+/* Wrong words are told before missing files: the second attempt shall not fail on them. */
+static bool check_words(const evt_replay_options_t *o, bool *usage_fault, evh_error_t *err)
+{
+    evt_replay_t dummy;
+    uint16_t ignored_w = 0u;
+    uint16_t ignored_h = 0u;
+    evs_pipeline_config_t pipeline;
+    bool on = false;
+    memset(&dummy, 0, sizeof dummy);
+    memset(&pipeline, 0, sizeof pipeline);
+    if ((o->size != NULL) && !evt_parse_size(o->size, &ignored_w, &ignored_h)) {
+        return usage(usage_fault, err, "--size", o->size, "WIDTHxHEIGHT, such as 240x180, up to 2048x2048");
+    }
+    if ((o->window != NULL) && !parse_window(o->window, &pipeline)) {
+        return usage(usage_fault, err, "--window", o->window,
+                     "area:COLSxROWS:EVENTS, count:EVENTS or time:MICROSECONDS");
+    }
+    if ((o->saccade != NULL) && !evt_parse_on_off(o->saccade, &on)) {
+        return usage(usage_fault, err, "--saccade", o->saccade, "on or off");
+    }
+    return settle_times(&dummy, o, usage_fault, err) && settle_write(&dummy, o, usage_fault, err);
+}
+
+bool evt_replay_settle(evt_replay_t *r, const evt_replay_options_t *options, bool *usage_fault, evh_error_t *err)
+{
+    memset(r, 0, sizeof *r);
+    *usage_fault = false;
+    return check_words(options, usage_fault, err) && settle(r, options, usage_fault, err);
+}
+
+void evt_replay_free(evt_replay_t *r) { evh_recording_free(&r->rec); }

@@ -1,0 +1,190 @@
+/* SPDX-License-Identifier: MIT
+ * SPDX-FileCopyrightText: 2026 the evstab authors */
+#include <inttypes.h>
+#include <cJSON.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "decimal.h"
+#include "evs/float.h"
+#include "evs/version.h"
+#include "replay.h"
+
+static void add_text(cJSON *to, const char *key, const char *text)
+{
+    if (text != NULL) {
+        (void)cJSON_AddStringToObject(to, key, text);
+    } else {
+        (void)cJSON_AddNullToObject(to, key);
+    }
+}
+
+static void add_count(cJSON *to, const char *key, uint64_t value)
+{
+    char text[24];
+    (void)snprintf(text, sizeof text, "%" PRIu64, value);
+    (void)cJSON_AddRawToObject(to, key, text); /* As digits: a double would round large counts. */
+}
+
+static void add_seconds(cJSON *to, const char *key, int64_t t_us)
+{
+    char text[32];
+    text[evh_decimal_format(text, t_us, 6u)] = '\0';
+    (void)cJSON_AddRawToObject(to, key, text);
+}
+
+/* A measured number: a few digits that mean something. */
+static void add_measure(cJSON *to, const char *key, double value)
+{
+    char text[40];
+    (void)snprintf(text, sizeof text, "%.4g", value);
+    (void)cJSON_AddRawToObject(to, key, text);
+}
+
+static void add_faults(cJSON *to, const char *key, const evh_tally_t *tally)
+{
+    cJSON *const faults = cJSON_AddObjectToObject(to, key);
+    for (int i = EVH_FAULT_NONE + 1; i < EVH_FAULT_COUNT; i++) {
+        add_count(faults, evh_fault_key((evh_fault_t)i), tally->n_fault[i]);
+    }
+}
+
+static void add_camera(cJSON *to, const evh_calib_t *c)
+{
+    cJSON *const camera = cJSON_AddObjectToObject(to, "camera");
+    cJSON *dist;
+    (void)cJSON_AddNumberToObject(camera, "width_px", c->width_px);
+    (void)cJSON_AddNumberToObject(camera, "height_px", c->height_px);
+    add_text(camera, "model", c->fisheye ? "fisheye" : "pinhole");
+    (void)cJSON_AddNumberToObject(camera, "fx_px", c->fx_px);
+    (void)cJSON_AddNumberToObject(camera, "fy_px", c->fy_px);
+    (void)cJSON_AddNumberToObject(camera, "cx_px", c->cx_px);
+    (void)cJSON_AddNumberToObject(camera, "cy_px", c->cy_px);
+    dist = cJSON_AddArrayToObject(camera, "distortion");
+    for (int i = 0; i < 5; i++) { (void)cJSON_AddItemToArray(dist, cJSON_CreateNumber(c->dist[i])); }
+}
+
+static void add_window(cJSON *to, const evs_pipeline_config_t *p)
+{
+    char text[64];
+    switch (p->window.kind) {
+    case EVS_WINDOW_AREA:
+        (void)snprintf(text, sizeof text, "area:%ux%u:%" PRIu32, (unsigned)p->n_cols, (unsigned)p->n_rows,
+                       p->window.threshold);
+        break;
+    case EVS_WINDOW_COUNT:
+        (void)snprintf(text, sizeof text, "count:%" PRIu32, p->window.threshold);
+        break;
+    default:
+        (void)snprintf(text, sizeof text, "time:%" PRIu32, p->window.duration_us);
+        break;
+    }
+    add_text(to, "window", text);
+}
+
+static void add_settings(cJSON *root, const evt_replay_t *r, const evt_replay_options_t *o)
+{
+    const evs_pipeline_config_t *const p = &r->pipeline;
+    const int32_t q[4] = {p->q_ci.w, p->q_ci.x, p->q_ci.y, p->q_ci.z};
+    cJSON *const s = cJSON_AddObjectToObject(root, "settings");
+    cJSON *q_ci;
+    add_text(s, "events", r->rec.events);
+    add_text(s, "imu", r->rec.imu);
+    add_text(s, "poses", r->rec.poses);
+    add_text(s, "calib", (o->calib != NULL) ? o->calib : r->rec.calib);
+    add_text(s, "config", (o->config != NULL) ? o->config : r->rec.config);
+    add_text(s, "attitude", evt_attitude_name(r->attitude));
+    add_window(s, p);
+    add_text(s, "rotation", (p->stabilize.rotation == EVS_ROTATION_WINDOW) ? "window" : "slice");
+    (void)cJSON_AddNumberToObject(s, "slice_max_us", p->stabilize.slice_max_us);
+    (void)cJSON_AddNumberToObject(s, "saccade_px", p->stabilize.saccade_px_q4 / 16.0);
+    (void)cJSON_AddBoolToObject(s, "paper", o->paper);
+    (void)cJSON_AddNumberToObject(s, "imu_offset_us", p->track.offset_us);
+    (void)cJSON_AddNumberToObject(s, "table_step_px", p->table_step_px);
+    q_ci = cJSON_AddArrayToObject(s, "q_camera_from_imu_wxyz");
+    for (int i = 0; i < 4; i++) { (void)cJSON_AddItemToArray(q_ci, cJSON_CreateNumber(evs_q_to_double(q[i], 30u))); }
+    if (r->from_us != INT64_MIN) { add_seconds(s, "from_s", r->from_us); }
+    if (r->to_us != INT64_MAX) { add_seconds(s, "to_s", r->to_us); }
+    add_camera(s, &r->calib);
+}
+
+static void add_events(cJSON *root, const evt_replay_result_t *x)
+{
+    cJSON *const e = cJSON_AddObjectToObject(root, "events");
+    cJSON *outside;
+    add_count(e, "in", x->events_tally.n_good + evh_tally_skipped(&x->events_tally));
+    add_count(e, "before_from", x->n_before_from);
+    add_count(e, "after_to", x->n_after_to);
+    add_count(e, "replayed", x->n_events);
+    add_count(e, "kept", x->n_kept);
+    outside = cJSON_AddObjectToObject(e, "outside");
+    add_count(outside, "no_undistorted_position", x->n_no_undistorted);
+    add_count(outside, "no_orientation", x->n_unoriented);
+    add_count(outside, "rotated_out_of_range", x->n_out_of_range);
+    add_faults(e, "bad", &x->events_tally);
+}
+
+static void add_attitude(cJSON *root, const evt_replay_t *r, const evt_replay_result_t *x)
+{
+    cJSON *const a = cJSON_AddObjectToObject(root, "attitude");
+    const evs_attitude_faults_t *const f = &x->attitude_faults;
+    add_count(a, "samples", x->n_orientations);
+    if (x->n_orientations > 0u) {
+        add_seconds(a, "t_first_s", x->orientation_first_us);
+        add_seconds(a, "t_last_s", x->orientation_last_us);
+    }
+    if ((r->attitude == EVT_ATTITUDE_IMU) || (r->attitude == EVT_ATTITUDE_GYRO)) {
+        add_faults(a, "bad", &x->imu_tally);
+        add_count(a, "gyro_saturated", f->n_gyro_saturated);
+        add_count(a, "gyro_spikes", f->n_gyro_spikes);
+        add_count(a, "gyro_gaps", f->n_gyro_gaps);
+        add_count(a, "accel_left_out", f->n_accel_bad);
+        add_count(a, "mag_left_out", f->n_mag_bad);
+    } else if (r->attitude == EVT_ATTITUDE_TRUTH) {
+        add_faults(a, "bad", &x->poses_tally);
+    }
+}
+
+static void add_all(cJSON *root, const evt_replay_t *r, const evt_replay_options_t *o, const evt_replay_result_t *x,
+                    const char *failure)
+{
+    const double n = (x->n_events > 0u) ? (double)x->n_events : 1.0;
+    add_text(root, "program", "evstab replay");
+    add_text(root, "library_version", EVS_VERSION_STRING);
+    if (failure != NULL) { add_text(root, "failure", failure); }
+    add_settings(root, r, o);
+    add_seconds(root, "t_first_s", x->t_first_us);
+    add_seconds(root, "t_last_s", x->t_last_us);
+    add_seconds(root, "duration_s", x->t_last_us - x->t_first_us);
+    add_events(root, x);
+    add_attitude(root, r, x);
+    add_count(root, "windows", x->n_windows);
+    add_count(root, "saccades", x->n_saccades);
+    add_measure(root, "wall_s", (double)x->wall_ns * 1e-9);
+    add_measure(root, "ns_per_event", (double)x->wall_ns / n);
+    add_measure(root, "library_ns_per_event", (double)x->library_ns / n);
+}
+
+bool evt_replay_write_summary(const evt_replay_t *r, const evt_replay_options_t *options,
+                              const evt_replay_result_t *result, const char *dir, const char *failure, evh_error_t *err)
+{
+    cJSON *const root = cJSON_CreateObject();
+    char *const path = evh_path_join(dir, "summary.json");
+    char *text = NULL;
+    bool ok = false;
+    if ((root != NULL) && (path != NULL)) {
+        add_all(root, r, options, result, failure);
+        text = cJSON_Print(root);
+    }
+    if (text != NULL) {
+        evh_csv_t out;
+        ok = evh_csv_open_path(&out, path, text, err) && evh_csv_close(&out, err);
+    } else {
+        (void)evh_fail(err, "%s/summary.json: out of memory", dir);
+    }
+    cJSON_free(text);
+    free(path);
+    cJSON_Delete(root);
+    return ok;
+}
