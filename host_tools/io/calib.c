@@ -9,9 +9,9 @@
 
 #include "lines.h"
 
-#define FOCAL_MIN_PX  1.0 /* The library's limits, evs/camera.h. */
-#define FOCAL_MAX_PX  16383.0
-#define CENTRE_MAX_PX 8191.0
+#define FOCAL_MIN_PX  8.0 /* The limits of the library: evs/homography.h, evs/camera.h. */
+#define FOCAL_MAX_PX  8192.0
+#define CENTRE_MAX_PX 4096.0
 #define DIST_MAX      16383.0
 
 bool evh_calib_check(const evh_calib_t *calib, const char *path, evh_error_t *err)
