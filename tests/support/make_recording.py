@@ -3,12 +3,12 @@
 # SPDX-FileCopyrightText: 2026 the evstab authors
 """Make a recording in the compact form that tests/target/replay.c reads (tests/target/recording.h), in time order.
 
-usage: make_recording.py OUT --events FILE --calib FILE [--imu FILE | --still] [--size WxH] [--lead-in SECONDS]
+usage: make_recording.py OUT --events FILE --calib FILE [--imu FILE | --rocking] [--size WxH] [--lead-in SECONDS]
        make_recording.py OUT --synthetic
 
 --events, --imu and --calib are in the text form of the Event-Camera Dataset; .gz is accepted. IMU samples are taken from
-LEAD-IN seconds before the first event (default 1) to the end of the events. --still stands in for a missing IMU: one at
-rest, 1 kHz. --synthetic needs no data: a rocking camera and random events, the same in every run.
+LEAD-IN seconds before the first event (default 1) to the end of the events. --rocking stands in for a missing IMU: a camera
+that rocks by up to 22 degrees at 5 to 9 Hz. --synthetic needs no data: that IMU and random events, the same in every run.
 """
 import argparse
 import gzip
@@ -20,7 +20,6 @@ from decimal import Decimal
 GYRO_Q, ACCEL_Q = 24, 20  # Fractional bits of rad/s and m/s^2, as evs/attitude.h takes them.
 EVENTS, IMU = 1, 2        # Kinds of chunks.
 EVENTS_MAX = 1024         # Events in a chunk: what the reader's buffer holds.
-STILL = (0, 0, 0), (0, -round(9.81 * 2**ACCEL_Q), 0)
 CALIB_SYNTHETIC = "199.0 198.5 132.2 110.7 -0.368 0.151 -0.0003 -0.00076 0.0"
 
 
@@ -53,19 +52,17 @@ def read_imu(path):
         yield microseconds(t), [fixed(v, GYRO_Q) for v in gyro], [fixed(v, ACCEL_Q) for v in accel]
 
 
-def still_imu(t_first, t_last):
+def rocking_imu(t_first, t_last):
     for t in range(t_first, t_last + 1000, 1000):
-        yield t, *STILL
+        swings = ((12.0, 5), (9.0, 7), (3.0, 9))  # rad/s, Hz
+        gyro = [round(2**GYRO_Q * rate * math.cos(2e-6 * math.pi * hz * (t - t_first))) for rate, hz in swings]
+        yield t, gyro, (0, round(-9.81 * 2**ACCEL_Q), 0)
 
 
 def synthetic(seconds=0.4):
-    """A camera that rocks by some degrees at 5 to 9 Hz, and a burst of noise in front of it."""
+    """Noise in front of a rocking camera."""
     state = 0x2545F4914F6CDD1D
-    events, imu = [], []
-    for ms in range(int(seconds * 1000) + 200):
-        t = ms / 1000
-        gyro = [round(2**GYRO_Q * a * math.cos(2 * math.pi * f * t)) for a, f in ((1.5, 5), (2.0, 7), (3.0, 9))]
-        imu.append((ms * 1000, gyro, STILL[1]))
+    events = []
     t = 100000  # After the first IMU samples.
     while t < (100 + seconds * 1000) * 1000:
         state ^= (state << 13) & (2**64 - 1)
@@ -74,7 +71,7 @@ def synthetic(seconds=0.4):
         t += state % 40
         # A few events off the sensor: they must be counted in the same way everywhere.
         events.append((t, (state >> 8) % 243, (state >> 20) % 181, (state >> 40) & 1))
-    return events, imu
+    return events, rocking_imu(0, events[-1][0] + 20000)
 
 
 def chunks(events, imu):
@@ -108,7 +105,7 @@ def main():
     parser.add_argument("--events")
     parser.add_argument("--calib")
     parser.add_argument("--imu")
-    parser.add_argument("--still", action="store_true")
+    parser.add_argument("--rocking", action="store_true")
     parser.add_argument("--synthetic", action="store_true")
     parser.add_argument("--size", default="240x180")
     parser.add_argument("--lead-in", type=float, default=1.0)
@@ -117,14 +114,14 @@ def main():
     if args.synthetic:
         events, imu = synthetic()
         calib = CALIB_SYNTHETIC.split()
-    elif args.events and args.calib and (args.imu or args.still):
+    elif args.events and args.calib and (args.imu or args.rocking):
         events = list(read_events(args.events))
         first = events[0][0] - round(args.lead_in * 1e6)
         last = events[-1][0] + 20000  # So that the last event's orientation gets known.
-        imu = still_imu(max(first, 0), last) if args.still else (s for s in read_imu(args.imu) if first <= s[0] <= last)
+        imu = rocking_imu(max(first, 0), last) if args.rocking else (s for s in read_imu(args.imu) if first <= s[0] <= last)
         calib = next(lines(args.calib))
     else:
-        parser.error("either --synthetic, or --events and --calib with --imu or --still")
+        parser.error("either --synthetic, or --events and --calib with --imu or --rocking")
 
     width, height = (int(n) for n in args.size.split("x"))
     pinhole = [fixed(c, 16) for c in calib[:4]]

@@ -18,7 +18,7 @@ function(evs_add_tree name)
   string(REPLACE ";" "|" arguments "${arg_UNPARSED_ARGUMENTS}")
   add_test(NAME target.${name}.build
            COMMAND ${CMAKE_COMMAND} -DSOURCE=${PROJECT_SOURCE_DIR} -DBINARY=${targets_root}/${name} -DTARGET=${arg_TARGET}
-                   "-DARGUMENTS=-DEVS_DEPS_DIR=${EVS_DEPS_DIR}|-DEVS_DATA_DIR=${EVS_DATA_DIR}|-DEVS_UNITY_DIR=${EVS_UNITY_DIR}|-DEVS_WERROR=ON|${arguments}"
+                   "-DARGUMENTS=-DEVS_DEPS_DIR=${EVS_DEPS_DIR}|-DEVS_DATA_DIR=${EVS_DATA_DIR}|-DEVS_UNITY_DIR=${EVS_UNITY_DIR}|-DEVS_RECORDINGS_DIR=${EVS_RECORDINGS_DIR}|-DPython3_EXECUTABLE=${Python3_EXECUTABLE}|-DEVS_WERROR=ON|${arguments}"
                    -P ${CMAKE_CURRENT_SOURCE_DIR}/build_tree.cmake)
   # Each build takes all cores by itself.
   set_tests_properties(target.${name}.build PROPERTIES LABELS target TIMEOUT 900 FIXTURES_SETUP tree_${name} RUN_SERIAL ON)
@@ -35,7 +35,9 @@ function(evs_add_tree_test tree test)
                                       SKIP_REGULAR_EXPRESSION "\\*\\*\\*Skipped")
 endfunction()
 
+find_package(Python3 REQUIRED COMPONENTS Interpreter)
 get_property(portable_tests GLOBAL PROPERTY EVS_TESTS_FOR_TARGETS)
+get_property(golden_tests GLOBAL PROPERTY EVS_GOLDEN_TESTS)
 foreach(target IN LISTS targets_with_board targets_without_board)
   evs_add_tree(${target} -DCMAKE_BUILD_TYPE=Release --toolchain ${PROJECT_SOURCE_DIR}/lib/cmake/${target}.cmake)
   foreach(test IN ITEMS evs refuses_heap refuses_libm refuses_stdio refuses_data refuses_bss)
@@ -51,8 +53,28 @@ foreach(target IN LISTS targets_with_board)
   endforeach()
 endforeach()
 
+# The output bits again, from other compilers, optimization levels and kernels of the host.
+find_program(EVS_GCC NAMES gcc)
+find_program(EVS_CLANG NAMES clang)
+foreach(compiler IN ITEMS gcc clang)
+  string(TOUPPER EVS_${compiler} path)
+  foreach(level IN ITEMS O0 O3)
+    foreach(simd IN ITEMS simd nosimd)
+      set(tree ${compiler}-${level}-${simd})
+      set(no_simd OFF)
+      if(simd STREQUAL "nosimd")
+        set(no_simd ON)
+      endif()
+      evs_add_tree(${tree} TARGET evs_replay -DCMAKE_C_COMPILER=${${path}} -DCMAKE_BUILD_TYPE=Debug
+                   -DCMAKE_C_FLAGS_DEBUG=-${level} -DEVS_NO_SIMD=${no_simd} -DEVS_BUILD_HOST_TOOLS=OFF)
+      foreach(test IN LISTS golden_tests)
+        evs_add_tree_test(${tree} ${test})
+      endforeach()
+    endforeach()
+  endforeach()
+endforeach()
+
 # The instruction counter, on a program whose counts are known: 10 calls of nothing, of 201 instructions, of the same.
-find_package(Python3 REQUIRED COMPONENTS Interpreter)
 if(TARGET evcount)
   foreach(target IN LISTS targets_with_board)
     set(board_m4f mps2-an386)
@@ -84,7 +106,7 @@ endif()
 # Builds the targets and writes the numbers into docs/ again.
 add_custom_target(
   evs_update_docs
-  COMMAND ${CMAKE_CTEST_COMMAND} --output-on-failure -R "^target[.][a-z0-9]+[.]build$"
+  COMMAND ${CMAKE_CTEST_COMMAND} --output-on-failure -R "^target[.](m|rv)[a-z0-9]+[.]build$"
   COMMAND ${memory_table} --write ${PROJECT_SOURCE_DIR}/docs/memory.md
   ${update_performance}
   WORKING_DIRECTORY ${PROJECT_BINARY_DIR}
