@@ -69,11 +69,15 @@ static bool set_up_tables(void)
         .dist_q32 = {-1582421910, 648313474, -1271871, -3261734, 0},
     };
     if ((evs_camera_init(&camera, &lens) != EVS_OK) || (evs_tile_grid_init(&grid, W, H, COLS, ROWS) != EVS_OK) ||
-        (evs_undistort_build(&full, &camera, 1u, table_full, EVS_UNDISTORT_POINTS(W, H, 1u)) != EVS_OK) ||
         (evs_undistort_build(&coarse, &camera, GRID_STEP, table_grid, EVS_UNDISTORT_POINTS(W, H, GRID_STEP)) !=
          EVS_OK)) {
         return false;
     }
+    /* The full table from the grid: the same to look up, and QEMU need not invert the lens 43200 times. */
+    for (uint16_t y = 0u; y < H; y++) {
+        for (uint16_t x = 0u; x < W; x++) { table_full[y * W + x] = evs_undistort_pixel(&coarse, x, y); }
+    }
+    if (evs_undistort_bind(&full, W, H, 1u, table_full, EVS_UNDISTORT_POINTS(W, H, 1u)) != EVS_OK) { return false; }
     full_tiles = full;
     coarse_tiles = coarse;
     return (evs_undistort_build_tiles(&full_tiles, &grid, table_tiles, EVS_UNDISTORT_TILES(W, H)) == EVS_OK) &&
