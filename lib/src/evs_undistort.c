@@ -2,10 +2,22 @@
  * SPDX-FileCopyrightText: 2026 the evstab authors */
 #include "evs/undistort.h"
 
+#include <string.h>
+
 EVS_STATIC_ASSERT(EVS_POINT_MAX_Q4 *EVS_UNDISTORT_STEP_MAX_PX <= (uint32_t)INT32_MAX / EVS_UNDISTORT_STEP_MAX_PX / 2u,
                   "bilinear interpolation overflows 32 bits");
 
 /* ---- Binding ---- */
+
+/* Whether a grid has nodes without a position. The hot path looks out for them only then. */
+static bool has_gaps(const evs_point_t *points, size_t n_points, uint8_t step_log2)
+{
+    if (step_log2 == 0u) { return false; }
+    for (size_t i = 0u; i < n_points; i++) {
+        if (evs_point_is_outside(points[i])) { return true; }
+    }
+    return false;
+}
 
 static bool step_to_log2(uint16_t step_px, uint8_t *step_log2)
 {
@@ -20,8 +32,8 @@ static bool step_to_log2(uint16_t step_px, uint8_t *step_log2)
 
 static bool is_sensor_length(uint16_t length_px) { return (length_px >= 1u) && (length_px <= EVS_SENSOR_MAX_PX); }
 
-evs_status_t evs_undistort_bind(evs_undistort_t *u, uint16_t width_px, uint16_t height_px, uint16_t step_px,
-                                const evs_point_t *points, size_t n_points)
+static evs_status_t set_table(evs_undistort_t *u, uint16_t width_px, uint16_t height_px, uint16_t step_px,
+                              const evs_point_t *points, size_t n_points)
 {
     if ((u == NULL) || (points == NULL)) { return EVS_ERR_NULL; }
     uint8_t step_log2;
@@ -37,6 +49,15 @@ evs_status_t evs_undistort_bind(evs_undistort_t *u, uint16_t width_px, uint16_t 
         .n_nodes_x = (uint16_t)EVS_UNDISTORT_NODES(width_px, step_px),
         .step_log2 = step_log2,
     };
+    return EVS_OK;
+}
+
+evs_status_t evs_undistort_bind(evs_undistort_t *u, uint16_t width_px, uint16_t height_px, uint16_t step_px,
+                                const evs_point_t *points, size_t n_points)
+{
+    const evs_status_t status = set_table(u, width_px, height_px, step_px, points, n_points);
+    if (status != EVS_OK) { return status; }
+    u->has_gaps = has_gaps(points, EVS_UNDISTORT_POINTS(width_px, height_px, step_px), u->step_log2);
     return EVS_OK;
 }
 
@@ -170,7 +191,7 @@ evs_status_t evs_undistort_build(evs_undistort_t *u, const evs_camera_t *cam, ui
                                  size_t n_points)
 {
     if (cam == NULL) { return EVS_ERR_NULL; }
-    const evs_status_t status = evs_undistort_bind(u, cam->cfg.width_px, cam->cfg.height_px, step_px, points, n_points);
+    const evs_status_t status = set_table(u, cam->cfg.width_px, cam->cfg.height_px, step_px, points, n_points);
     if (status != EVS_OK) { return status; }
 
     const size_t n_rows = EVS_UNDISTORT_NODES(cam->cfg.height_px, step_px);
@@ -187,47 +208,171 @@ evs_status_t evs_undistort_build(evs_undistort_t *u, const evs_camera_t *cam, ui
             i++;
         }
     }
+    u->has_gaps = has_gaps(points, i, u->step_log2);
     return EVS_OK;
 }
 
 /* ---- The hot path ---- */
 
-static bool is_on_sensor(const evs_undistort_t *u, uint32_t x_px, uint32_t y_px)
+#if defined(__GNUC__)
+#define LIKELY(c) __builtin_expect((c), 1) /* keeps the common path of a loop in one piece */
+#else
+#define LIKELY(c) (c)
+#endif
+
+/* A pixel as one word: x in the low half, y in the high half. */
+#define PIXEL(x_px, y_px) ((uint32_t)(x_px) | ((uint32_t)(y_px) << 16))
+
+/* Interpolation works with 32 parts of a cell whatever its step: a constant number costs no register. */
+#define PARTS_LOG2 5u
+#define PARTS      (1u << PARTS_LOG2)
+
+EVS_STATIC_ASSERT(PARTS == EVS_UNDISTORT_STEP_MAX_PX, "a cell of the largest step has one part per pixel");
+EVS_STATIC_ASSERT((EVS_SENSOR_MAX_PX - 1u) * PARTS <= UINT16_MAX, "a coordinate in parts must fit half a word");
+
+/* By value: in a loop it stays in registers, whatever the outputs might alias. */
+typedef struct {
+    uint32_t last;     /* the last pixel */
+    uint32_t pitch_px; /* the width of a row, in the form that index_of() wants */
+} sensor_t;
+
+typedef struct {
+    const evs_point_t *points;
+    uint32_t n_nodes_x;
+    uint32_t to_parts_log2; /* pixel << this = position in parts */
+    bool has_gaps;
+} lattice_t;
+
+static inline lattice_t lattice_of(const evs_undistort_t *u)
 {
-    return (x_px < u->width_px) && (y_px < u->height_px);
+    const lattice_t g = {u->points, u->n_nodes_x, PARTS_LOG2 - u->step_log2, u->has_gaps};
+    return g;
+}
+
+#if !EVS_NO_SIMD && defined(__ARM_FEATURE_DSP) && defined(__ARM_FEATURE_SIMD32) && defined(__ARMEL__) &&               \
+    defined(__GNUC__)
+/* Cores with the DSP extension work on both halves of a word at once. The plain C below is what this computes. */
+
+static inline sensor_t sensor_of(const evs_undistort_t *u)
+{
+    const sensor_t s = {PIXEL(u->width_px - 1u, u->height_px - 1u), PIXEL(1u, u->width_px)};
+    return s;
+}
+
+static inline uint32_t pixel_of(const evs_event_t *ev)
+{
+    uint32_t pixel;
+    memcpy(&pixel, &ev->x_px, sizeof pixel); /* one aligned load: x_px and y_px are neighbours */
+    return pixel & ~((uint32_t)EVS_EVENT_POLARITY_BIT << 16);
+}
+
+static inline bool is_on(sensor_t s, uint32_t pixel)
+{
+    uint32_t beyond; /* by how much each half exceeds the last pixel's, or 0 */
+    __asm__("uqsub16 %0, %1, %2" : "=r"(beyond) : "r"(pixel), "r"(s.last));
+    return beyond == 0u;
+}
+
+static inline uint32_t dual_mul(uint32_t a, uint32_t b) /* low * low + high * high, signed */
+{
+    uint32_t sum;
+    __asm__("smuad %0, %1, %2" : "=r"(sum) : "r"(a), "r"(b));
+    return sum;
+}
+
+static inline uint32_t index_of(sensor_t s, uint32_t pixel) { return dual_mul(pixel, s.pitch_px); }
+
+static inline uint32_t word_of(const evs_point_t *p)
+{
+    uint32_t word;
+    memcpy(&word, p, sizeof word);
+    return word;
+}
+
+static inline uint32_t low_halves(uint32_t low, uint32_t high)
+{
+    uint32_t word;
+    __asm__("pkhbt %0, %1, %2, lsl #16" : "=r"(word) : "r"(low), "r"(high));
+    return word;
+}
+
+static inline uint32_t high_halves(uint32_t low, uint32_t high)
+{
+    uint32_t word;
+    __asm__("pkhtb %0, %2, %1, asr #16" : "=r"(word) : "r"(low), "r"(high));
+    return word;
+}
+
+/* Both coordinates between two neighbours in a row, times PARTS. */
+static inline void blend(const evs_point_t *pair, uint32_t left, uint32_t right, int32_t *x, int32_t *y)
+{
+    const uint32_t a = word_of(&pair[0]);
+    const uint32_t b = word_of(&pair[1]);
+    const uint32_t weights = low_halves(left, right);
+    *x = (int32_t)dual_mul(low_halves(a, b), weights);
+    *y = (int32_t)dual_mul(high_halves(a, b), weights);
+}
+#else
+static inline sensor_t sensor_of(const evs_undistort_t *u)
+{
+    const sensor_t s = {PIXEL(u->width_px - 1u, u->height_px - 1u), u->width_px};
+    return s;
+}
+
+static inline uint32_t pixel_of(const evs_event_t *ev) { return PIXEL(evs_event_x_px(*ev), evs_event_y_px(*ev)); }
+
+static inline bool is_on(sensor_t s, uint32_t pixel)
+{
+    return ((pixel & 0xFFFFu) <= (s.last & 0xFFFFu)) && ((pixel >> 16) <= (s.last >> 16));
+}
+
+static inline uint32_t index_of(sensor_t s, uint32_t pixel) { return (pixel >> 16) * s.pitch_px + (pixel & 0xFFFFu); }
+
+static inline void blend(const evs_point_t *pair, uint32_t left, uint32_t right, int32_t *x, int32_t *y)
+{
+    *x = pair[0].x_q4 * (int32_t)left + pair[1].x_q4 * (int32_t)right;
+    *y = pair[0].y_q4 * (int32_t)left + pair[1].y_q4 * (int32_t)right;
+}
+#endif
+
+static inline bool has_gap(const evs_point_t *upper, const evs_point_t *lower)
+{
+    return evs_point_is_outside(upper[0]) || evs_point_is_outside(upper[1]) || evs_point_is_outside(lower[0]) ||
+           evs_point_is_outside(lower[1]);
 }
 
 /* Bilinear interpolation, rounded half up; OUTSIDE if a corner of the cell is. */
-static evs_point_t interpolate(const evs_undistort_t *u, uint32_t x_px, uint32_t y_px)
+static inline evs_point_t interpolate(lattice_t g, uint32_t pixel)
 {
-    const uint32_t k = u->step_log2;
-    const int32_t step = (int32_t)(1u << k);
-    const int32_t fx = (int32_t)(x_px & ((1u << k) - 1u));
-    const int32_t fy = (int32_t)(y_px & ((1u << k) - 1u));
-    const evs_point_t *const upper = u->points + (size_t)(y_px >> k) * u->n_nodes_x + (x_px >> k);
-    const evs_point_t *const lower = upper + u->n_nodes_x;
-    const evs_point_t a = upper[0];
-    const evs_point_t b = upper[1];
-    const evs_point_t c = lower[0];
-    const evs_point_t d = lower[1];
-    if (evs_point_is_outside(a) || evs_point_is_outside(b) || evs_point_is_outside(c) || evs_point_is_outside(d)) {
-        return evs_point_outside();
-    }
-    const int32_t top_x = a.x_q4 * step + (b.x_q4 - a.x_q4) * fx;
-    const int32_t top_y = a.y_q4 * step + (b.y_q4 - a.y_q4) * fx;
-    const int32_t bottom_x = c.x_q4 * step + (d.x_q4 - c.x_q4) * fx;
-    const int32_t bottom_y = c.y_q4 * step + (d.y_q4 - c.y_q4) * fx;
-    const int32_t half = step * step / 2;
-    const evs_point_t p = {(int16_t)((top_x * step + (bottom_x - top_x) * fy + half) >> (2u * k)),
-                           (int16_t)((top_y * step + (bottom_y - top_y) * fy + half) >> (2u * k))};
+    const uint32_t parts = pixel << g.to_parts_log2; /* on the sensor neither half can spill into the other */
+    const uint32_t right = parts & (PARTS - 1u);
+    const uint32_t bottom = (parts >> 16) & (PARTS - 1u);
+    const uint32_t column = (parts & 0xFFFFu) >> PARTS_LOG2;
+    const uint32_t row = parts >> (16u + PARTS_LOG2);
+    const evs_point_t *const upper = g.points + (row * g.n_nodes_x + column);
+    const evs_point_t *const lower = upper + g.n_nodes_x;
+    if (g.has_gaps && has_gap(upper, lower)) { return evs_point_outside(); }
+
+    int32_t upper_x;
+    int32_t upper_y;
+    int32_t lower_x;
+    int32_t lower_y;
+    blend(upper, PARTS - right, right, &upper_x, &upper_y);
+    blend(lower, PARTS - right, right, &lower_x, &lower_y);
+    const int32_t half = (int32_t)(PARTS * PARTS / 2u);
+    const int32_t down = (int32_t)bottom;
+    const int32_t up = (int32_t)(PARTS - bottom);
+    const evs_point_t p = {(int16_t)((upper_x * up + lower_x * down + half) >> (2u * PARTS_LOG2)),
+                           (int16_t)((upper_y * up + lower_y * down + half) >> (2u * PARTS_LOG2))};
     return p;
 }
 
 evs_point_t evs_undistort_pixel(const evs_undistort_t *u, uint16_t x_px, uint16_t y_px)
 {
     EVS_ASSERT(u != NULL);
-    if (!is_on_sensor(u, x_px, y_px)) { return evs_point_outside(); }
-    return (u->step_log2 == 0u) ? u->points[(size_t)y_px * u->width_px + x_px] : interpolate(u, x_px, y_px);
+    if ((x_px >= u->width_px) || (y_px >= u->height_px)) { return evs_point_outside(); }
+    return (u->step_log2 == 0u) ? u->points[(size_t)y_px * u->width_px + x_px]
+                                : interpolate(lattice_of(u), PIXEL(x_px, y_px));
 }
 
 static void count_rejected(evs_undistort_t *u, size_t n)
@@ -239,14 +384,12 @@ static void count_rejected(evs_undistort_t *u, size_t n)
 static void map_exact(evs_undistort_t *u, const evs_event_t *ev, size_t n, evs_point_t *points)
 {
     const evs_point_t *const table = u->points;
-    const uint32_t width_px = u->width_px;
-    const uint32_t height_px = u->height_px;
+    const sensor_t sensor = sensor_of(u);
     size_t n_off = 0u;
     for (size_t i = 0u; i < n; i++) {
-        const uint32_t x_px = evs_event_x_px(ev[i]);
-        const uint32_t y_px = evs_event_y_px(ev[i]);
-        if ((x_px < width_px) && (y_px < height_px)) {
-            points[i] = table[y_px * width_px + x_px];
+        const uint32_t pixel = pixel_of(&ev[i]);
+        if (LIKELY(is_on(sensor, pixel))) {
+            points[i] = table[index_of(sensor, pixel)];
         } else {
             points[i] = evs_point_outside();
             n_off++;
@@ -259,14 +402,12 @@ static void map_exact_tiles(evs_undistort_t *u, const evs_event_t *ev, size_t n,
 {
     const evs_point_t *const point_table = u->points;
     const uint16_t *const tile_table = u->tiles;
-    const uint32_t width_px = u->width_px;
-    const uint32_t height_px = u->height_px;
+    const sensor_t sensor = sensor_of(u);
     size_t n_off = 0u;
     for (size_t i = 0u; i < n; i++) {
-        const uint32_t x_px = evs_event_x_px(ev[i]);
-        const uint32_t y_px = evs_event_y_px(ev[i]);
-        if ((x_px < width_px) && (y_px < height_px)) {
-            const uint32_t at = y_px * width_px + x_px;
+        const uint32_t pixel = pixel_of(&ev[i]);
+        if (LIKELY(is_on(sensor, pixel))) {
+            const uint32_t at = index_of(sensor, pixel);
             points[i] = point_table[at];
             tiles[i] = tile_table[at];
         } else {
@@ -280,12 +421,13 @@ static void map_exact_tiles(evs_undistort_t *u, const evs_event_t *ev, size_t n,
 
 static void map_grid(evs_undistort_t *u, const evs_event_t *ev, size_t n, evs_point_t *points)
 {
+    const lattice_t grid = lattice_of(u);
+    const sensor_t sensor = sensor_of(u);
     size_t n_off = 0u;
     for (size_t i = 0u; i < n; i++) {
-        const uint32_t x_px = evs_event_x_px(ev[i]);
-        const uint32_t y_px = evs_event_y_px(ev[i]);
-        if (is_on_sensor(u, x_px, y_px)) {
-            points[i] = interpolate(u, x_px, y_px);
+        const uint32_t pixel = pixel_of(&ev[i]);
+        if (LIKELY(is_on(sensor, pixel))) {
+            points[i] = interpolate(grid, pixel);
         } else {
             points[i] = evs_point_outside();
             n_off++;
@@ -312,13 +454,15 @@ void evs_undistort_map_tiles(evs_undistort_t *u, const evs_event_t *ev, size_t n
         return;
     }
     evs_undistort_map(u, ev, n, points);
-    const evs_tile_grid_t grid = u->grid; /* a copy the compiler may keep in registers: `tiles` cannot alias it */
+    const evs_tile_grid_t grid = u->grid;
+    const uint16_t *const table = u->tiles;
+    const sensor_t sensor = sensor_of(u);
     for (size_t i = 0u; i < n; i++) {
-        if (u->tiles == NULL) {
+        if (table == NULL) {
             tiles[i] = evs_tile_of_point(&grid, points[i]);
         } else {
-            const uint32_t at = (uint32_t)evs_event_y_px(ev[i]) * u->width_px + evs_event_x_px(ev[i]);
-            tiles[i] = is_on_sensor(u, evs_event_x_px(ev[i]), evs_event_y_px(ev[i])) ? u->tiles[at] : EVS_TILE_NONE;
+            const uint32_t pixel = pixel_of(&ev[i]);
+            tiles[i] = is_on(sensor, pixel) ? table[index_of(sensor, pixel)] : EVS_TILE_NONE;
         }
     }
 }

@@ -53,6 +53,7 @@ typedef struct {               /** Context. A complete type only so that you can
     uint16_t n_nodes_x; /**< Points in a row of the table. */
     uint8_t step_log2;
     bool has_tiles; /**< A tile grid was given. */
+    bool has_gaps;  /**< Some node of a grid has no position. */
     evs_tile_grid_t grid;
 } evs_undistort_t;
 
