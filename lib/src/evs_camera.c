@@ -6,7 +6,6 @@
 #include "evs_wide.h"
 
 #define ONE          EVS_WIDE_ONE_Q32
-#define HALF_PI_Q32  (EVS_WIDE_PI_Q32 / 2)
 #define PX_MAX_Q32   (INT64_C(2047) << 32)  /* range of evs_point_t */
 #define PX_MAX_Q16   (INT64_C(32767) << 16) /* range of evs_camera_px_t, less one */
 #define RADIUS_MAX   (INT64_C(64) << 32)    /* of a pinhole ray: 89.1 degrees */
@@ -14,15 +13,18 @@
 
 /* The domain ends where the image of a small step shrinks to this: closer to the fold the inverse amplifies the last
  * bit of the calibration without limit. It costs a ring of the distorted image of about 1e-6 of the focal length. */
-#define SLOPE_MIN   (ONE >> 10)
-#define DOMAIN_MIN  (ONE >> 10) /* A model that folds over within 0.06 degrees of the axis is a mistake. */
-#define N_SCAN      1024        /* Steps in which the fold is looked for before it is bracketed. */
-#define N_BISECT    40
-#define N_RADIAL    64  /* Newton needs about 5; bisection, when Newton leaves its bracket, at most 46. */
-#define N_NEWTON    20  /* Needs about 3. */
-#define CONVERGED   2   /* LSB of the residual: rounding noise. */
-#define ACCEPTED    256 /* LSB of the residual that is still an answer (6e-8) when rounding keeps it from settling. */
-#define N_STUCK_LSB 16
+#define SLOPE_MIN  (ONE >> 10)
+#define DOMAIN_MIN (ONE >> 10) /* A model that folds over within 0.06 degrees of the axis is a mistake. */
+#define N_SCAN     1024        /* Steps in which the fold is looked for before it is bracketed. */
+#define N_BISECT   40
+#define N_RADIAL   128 /* Newton needs about 5; every second step at least halves bracket or step: 2 * 38 bits. */
+#define N_NEWTON   20  /* Needs about 3. */
+/* In LSB. Where the lens is steep the step settles first, where it is flat the residual does; next to the fold neither
+ * may, because rounding is magnified there. */
+#define CONVERGED 2   /* residual: rounding noise */
+#define SETTLED   16  /* step: no better answer exists */
+#define ACCEPTED  256 /* residual that is still an answer, 6e-8, when neither settles */
+#define STUCK     16  /* movement along the edge of the domain */
 
 typedef struct {
     int64_t x; /* Normalised image coordinates, 32 fractional bits. */
@@ -53,13 +55,15 @@ static int64_t slope_of(const int64_t c[4], int64_t t2) /* g'(t) */
     return ONE + mul(t2, 3 * c[0] + mul(t2, 5 * c[1] + mul(t2, 7 * c[2] + mul(t2, 9 * c[3]))));
 }
 
-/* t in [0, domain] with g(t) = d, or the end of the domain when d lies beyond it. Newton, kept inside a bracket. */
+/* t in [0, domain] with g(t) = d, or the end of the domain when d lies beyond it. Newton inside a shrinking bracket: a
+ * step that leaves it, or is not half as long as the one before, gives way to bisection, so that nothing can cycle. */
 static int64_t radial_inverse(const evs_camera_t *cam, int64_t d)
 {
     int64_t lo = 0;
     int64_t hi = cam->domain_q32;
     if (d >= cam->domain_d_q32) { return hi; }
     int64_t t = (d < hi) ? d : hi;
+    int64_t last = hi;
     for (int i = 0; i < N_RADIAL; i++) {
         const int64_t t2 = mul(t, t);
         const int64_t excess = mul(t, gain_of(cam->poly_q32, t2)) - d;
@@ -69,10 +73,10 @@ static int64_t radial_inverse(const evs_camera_t *cam, int64_t d)
             lo = t;
         }
         int64_t next = t - evs_wide_div_q32(excess, slope_of(cam->poly_q32, t2));
-        if ((next < lo) || (next > hi)) { next = lo + (hi - lo) / 2; }
-        const bool settled = within(next - t, 1);
+        if ((next < lo) || (next > hi) || (abs64(next - t) > last / 2)) { next = lo + (hi - lo) / 2; }
+        last = abs64(next - t);
         t = next;
-        if (settled) { break; }
+        if (last <= 1) { break; }
     }
     return t;
 }
@@ -234,7 +238,7 @@ static jacobian_t brown_jacobian(const evs_camera_t *cam, vec2_t v)
 static vec2_t newton_step(jacobian_t j, vec2_t error)
 {
     const int64_t det = mul(j.xx, j.yy) - mul(j.xy, j.xy);
-    if (det <= 0) { return (vec2_t){0, 0}; } /* only by rounding, at the very edge of the domain */
+    if (det <= 0) { return (vec2_t){ONE, ONE}; } /* by rounding, at the very edge of the domain: any large step */
     const vec2_t step = {evs_wide_div_q32(mul(j.yy, error.x) - mul(j.xy, error.y), det),
                          evs_wide_div_q32(mul(j.xx, error.y) - mul(j.xy, error.x), det)};
     return step;
@@ -251,25 +255,28 @@ static evs_status_t brown_inverse(const evs_camera_t *cam, vec2_t d, vec2_t *out
         const int64_t shrink = evs_wide_div_q32(radial_inverse(cam, rd), rd);
         v = (vec2_t){mul(d.x, shrink), mul(d.y, shrink)};
     }
-    int64_t residual = 0;
+    bool found = false;
     for (int i = 0; i < N_NEWTON; i++) {
         const vec2_t there = brown(cam, v);
         const vec2_t error = {d.x - there.x, d.y - there.y};
-        residual = abs64(error.x) + abs64(error.y);
-        if (residual <= CONVERGED) { break; }
-
+        const int64_t residual = abs64(error.x) + abs64(error.y);
         const vec2_t step = newton_step(brown_jacobian(cam, v), error);
+        found = (residual <= ACCEPTED);
+        if ((residual <= CONVERGED) || (abs64(step.x) + abs64(step.y) <= SETTLED)) {
+            found = true;
+            break;
+        }
         vec2_t next = {v.x + step.x, v.y + step.y};
         const int64_t r = evs_wide_hypot(next.x, next.y);
         if (r > cam->domain_q32) { /* stay where the model can be trusted */
             const int64_t back = evs_wide_div_q32(cam->domain_q32, r);
             next = (vec2_t){mul(next.x, back), mul(next.y, back)};
+            const bool stuck = (abs64(next.x - v.x) + abs64(next.y - v.y) <= STUCK);
+            if (stuck && !found) { break; } /* pressed against the edge: no preimage */
         }
-        const bool stuck = (abs64(next.x - v.x) + abs64(next.y - v.y)) <= N_STUCK_LSB;
         v = next;
-        if (stuck && (residual > ACCEPTED)) { break; } /* pressed against the edge: no preimage inside */
     }
-    if ((residual > ACCEPTED) || (evs_wide_hypot(v.x, v.y) > cam->domain_q32)) { return EVS_ERR_NUMERIC; }
+    if (!found || (evs_wide_hypot(v.x, v.y) > cam->domain_q32)) { return EVS_ERR_NUMERIC; }
     *out = v;
     return EVS_OK;
 }

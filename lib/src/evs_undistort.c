@@ -220,9 +220,6 @@ evs_status_t evs_undistort_build(evs_undistort_t *u, const evs_camera_t *cam, ui
 #define LIKELY(c) (c)
 #endif
 
-/* A pixel as one word: x in the low half, y in the high half. */
-#define PIXEL(x_px, y_px) ((uint32_t)(x_px) | ((uint32_t)(y_px) << 16))
-
 /* Interpolation works with 32 parts of a cell whatever its step: a constant number costs no register. */
 #define PARTS_LOG2 5u
 #define PARTS      (1u << PARTS_LOG2)
@@ -230,12 +227,14 @@ evs_status_t evs_undistort_build(evs_undistort_t *u, const evs_camera_t *cam, ui
 EVS_STATIC_ASSERT(PARTS == EVS_UNDISTORT_STEP_MAX_PX, "a cell of the largest step has one part per pixel");
 EVS_STATIC_ASSERT((EVS_SENSOR_MAX_PX - 1u) * PARTS <= UINT16_MAX, "a coordinate in parts must fit half a word");
 
-/* By value: in a loop it stays in registers, whatever the outputs might alias. */
-typedef struct {
-    uint32_t last;     /* the last pixel */
-    uint32_t pitch_px; /* the width of a row, in the form that index_of() wants */
-} sensor_t;
+typedef struct { /* Where a pixel lies on a grid: the upper left node of its cell, and the parts from there. */
+    uint32_t column;
+    uint32_t row;
+    uint32_t right;
+    uint32_t bottom;
+} cell_t;
 
+/* By value: in a loop it stays in registers, whatever the outputs might alias. */
 typedef struct {
     const evs_point_t *points;
     uint32_t n_nodes_x;
@@ -253,23 +252,32 @@ static inline lattice_t lattice_of(const evs_undistort_t *u)
     defined(__GNUC__)
 /* Cores with the DSP extension work on both halves of a word at once. The plain C below is what this computes. */
 
+typedef uint32_t pixel_t; /* x in the low half, y in the high half */
+
+typedef struct {
+    pixel_t last;
+    uint32_t pitch; /* 1 and the width */
+} sensor_t;
+
+static inline pixel_t pixel_at(uint32_t x_px, uint32_t y_px) { return x_px | (y_px << 16); }
+
+static inline pixel_t pixel_of(const evs_event_t *ev)
+{
+    uint32_t word;
+    memcpy(&word, &ev->x_px, sizeof word); /* one aligned load: x_px and y_px are neighbours */
+    return word & ~((uint32_t)EVS_EVENT_POLARITY_BIT << 16);
+}
+
 static inline sensor_t sensor_of(const evs_undistort_t *u)
 {
-    const sensor_t s = {PIXEL(u->width_px - 1u, u->height_px - 1u), PIXEL(1u, u->width_px)};
+    const sensor_t s = {pixel_at(u->width_px - 1u, u->height_px - 1u), pixel_at(1u, u->width_px)};
     return s;
 }
 
-static inline uint32_t pixel_of(const evs_event_t *ev)
-{
-    uint32_t pixel;
-    memcpy(&pixel, &ev->x_px, sizeof pixel); /* one aligned load: x_px and y_px are neighbours */
-    return pixel & ~((uint32_t)EVS_EVENT_POLARITY_BIT << 16);
-}
-
-static inline bool is_on(sensor_t s, uint32_t pixel)
+static inline bool is_on(sensor_t s, pixel_t p)
 {
     uint32_t beyond; /* by how much each half exceeds the last pixel's, or 0 */
-    __asm__("uqsub16 %0, %1, %2" : "=r"(beyond) : "r"(pixel), "r"(s.last));
+    __asm__("uqsub16 %0, %1, %2" : "=r"(beyond) : "r"(p), "r"(s.last));
     return beyond == 0u;
 }
 
@@ -280,7 +288,15 @@ static inline uint32_t dual_mul(uint32_t a, uint32_t b) /* low * low + high * hi
     return sum;
 }
 
-static inline uint32_t index_of(sensor_t s, uint32_t pixel) { return dual_mul(pixel, s.pitch_px); }
+static inline uint32_t index_of(sensor_t s, pixel_t p) { return dual_mul(p, s.pitch); }
+
+static inline cell_t cell_of(pixel_t p, uint32_t to_parts_log2)
+{
+    const uint32_t parts = p << to_parts_log2; /* on the sensor neither half can spill into the other */
+    const cell_t c = {(parts & 0xFFFFu) >> PARTS_LOG2, parts >> (16u + PARTS_LOG2), parts & (PARTS - 1u),
+                      (parts >> 16) & (PARTS - 1u)};
+    return c;
+}
 
 static inline uint32_t word_of(const evs_point_t *p)
 {
@@ -313,20 +329,41 @@ static inline void blend(const evs_point_t *pair, uint32_t left, uint32_t right,
     *y = (int32_t)dual_mul(high_halves(a, b), weights);
 }
 #else
+typedef struct {
+    uint32_t x_px;
+    uint32_t y_px;
+} pixel_t;
+
+typedef struct {
+    uint32_t width_px;
+    uint32_t height_px;
+} sensor_t;
+
+static inline pixel_t pixel_at(uint32_t x_px, uint32_t y_px)
+{
+    const pixel_t p = {x_px, y_px};
+    return p;
+}
+
+static inline pixel_t pixel_of(const evs_event_t *ev) { return pixel_at(evs_event_x_px(*ev), evs_event_y_px(*ev)); }
+
 static inline sensor_t sensor_of(const evs_undistort_t *u)
 {
-    const sensor_t s = {PIXEL(u->width_px - 1u, u->height_px - 1u), u->width_px};
+    const sensor_t s = {u->width_px, u->height_px};
     return s;
 }
 
-static inline uint32_t pixel_of(const evs_event_t *ev) { return PIXEL(evs_event_x_px(*ev), evs_event_y_px(*ev)); }
+static inline bool is_on(sensor_t s, pixel_t p) { return (p.x_px < s.width_px) && (p.y_px < s.height_px); }
 
-static inline bool is_on(sensor_t s, uint32_t pixel)
+static inline uint32_t index_of(sensor_t s, pixel_t p) { return p.y_px * s.width_px + p.x_px; }
+
+static inline cell_t cell_of(pixel_t p, uint32_t to_parts_log2)
 {
-    return ((pixel & 0xFFFFu) <= (s.last & 0xFFFFu)) && ((pixel >> 16) <= (s.last >> 16));
+    const uint32_t x = p.x_px << to_parts_log2;
+    const uint32_t y = p.y_px << to_parts_log2;
+    const cell_t c = {x >> PARTS_LOG2, y >> PARTS_LOG2, x & (PARTS - 1u), y & (PARTS - 1u)};
+    return c;
 }
-
-static inline uint32_t index_of(sensor_t s, uint32_t pixel) { return (pixel >> 16) * s.pitch_px + (pixel & 0xFFFFu); }
 
 static inline void blend(const evs_point_t *pair, uint32_t left, uint32_t right, int32_t *x, int32_t *y)
 {
@@ -342,14 +379,10 @@ static inline bool has_gap(const evs_point_t *upper, const evs_point_t *lower)
 }
 
 /* Bilinear interpolation, rounded half up; OUTSIDE if a corner of the cell is. */
-static inline evs_point_t interpolate(lattice_t g, uint32_t pixel)
+static inline evs_point_t interpolate(lattice_t g, pixel_t pixel)
 {
-    const uint32_t parts = pixel << g.to_parts_log2; /* on the sensor neither half can spill into the other */
-    const uint32_t right = parts & (PARTS - 1u);
-    const uint32_t bottom = (parts >> 16) & (PARTS - 1u);
-    const uint32_t column = (parts & 0xFFFFu) >> PARTS_LOG2;
-    const uint32_t row = parts >> (16u + PARTS_LOG2);
-    const evs_point_t *const upper = g.points + (row * g.n_nodes_x + column);
+    const cell_t cell = cell_of(pixel, g.to_parts_log2);
+    const evs_point_t *const upper = g.points + (cell.row * g.n_nodes_x + cell.column);
     const evs_point_t *const lower = upper + g.n_nodes_x;
     if (g.has_gaps && has_gap(upper, lower)) { return evs_point_outside(); }
 
@@ -357,11 +390,11 @@ static inline evs_point_t interpolate(lattice_t g, uint32_t pixel)
     int32_t upper_y;
     int32_t lower_x;
     int32_t lower_y;
-    blend(upper, PARTS - right, right, &upper_x, &upper_y);
-    blend(lower, PARTS - right, right, &lower_x, &lower_y);
+    blend(upper, PARTS - cell.right, cell.right, &upper_x, &upper_y);
+    blend(lower, PARTS - cell.right, cell.right, &lower_x, &lower_y);
     const int32_t half = (int32_t)(PARTS * PARTS / 2u);
-    const int32_t down = (int32_t)bottom;
-    const int32_t up = (int32_t)(PARTS - bottom);
+    const int32_t down = (int32_t)cell.bottom;
+    const int32_t up = (int32_t)(PARTS - cell.bottom);
     const evs_point_t p = {(int16_t)((upper_x * up + lower_x * down + half) >> (2u * PARTS_LOG2)),
                            (int16_t)((upper_y * up + lower_y * down + half) >> (2u * PARTS_LOG2))};
     return p;
@@ -372,7 +405,7 @@ evs_point_t evs_undistort_pixel(const evs_undistort_t *u, uint16_t x_px, uint16_
     EVS_ASSERT(u != NULL);
     if ((x_px >= u->width_px) || (y_px >= u->height_px)) { return evs_point_outside(); }
     return (u->step_log2 == 0u) ? u->points[(size_t)y_px * u->width_px + x_px]
-                                : interpolate(lattice_of(u), PIXEL(x_px, y_px));
+                                : interpolate(lattice_of(u), pixel_at(x_px, y_px));
 }
 
 static void count_rejected(evs_undistort_t *u, size_t n)
@@ -387,7 +420,7 @@ static void map_exact(evs_undistort_t *u, const evs_event_t *ev, size_t n, evs_p
     const sensor_t sensor = sensor_of(u);
     size_t n_off = 0u;
     for (size_t i = 0u; i < n; i++) {
-        const uint32_t pixel = pixel_of(&ev[i]);
+        const pixel_t pixel = pixel_of(&ev[i]);
         if (LIKELY(is_on(sensor, pixel))) {
             points[i] = table[index_of(sensor, pixel)];
         } else {
@@ -405,7 +438,7 @@ static void map_exact_tiles(evs_undistort_t *u, const evs_event_t *ev, size_t n,
     const sensor_t sensor = sensor_of(u);
     size_t n_off = 0u;
     for (size_t i = 0u; i < n; i++) {
-        const uint32_t pixel = pixel_of(&ev[i]);
+        const pixel_t pixel = pixel_of(&ev[i]);
         if (LIKELY(is_on(sensor, pixel))) {
             const uint32_t at = index_of(sensor, pixel);
             points[i] = point_table[at];
@@ -425,7 +458,7 @@ static void map_grid(evs_undistort_t *u, const evs_event_t *ev, size_t n, evs_po
     const sensor_t sensor = sensor_of(u);
     size_t n_off = 0u;
     for (size_t i = 0u; i < n; i++) {
-        const uint32_t pixel = pixel_of(&ev[i]);
+        const pixel_t pixel = pixel_of(&ev[i]);
         if (LIKELY(is_on(sensor, pixel))) {
             points[i] = interpolate(grid, pixel);
         } else {
@@ -454,16 +487,16 @@ void evs_undistort_map_tiles(evs_undistort_t *u, const evs_event_t *ev, size_t n
         return;
     }
     evs_undistort_map(u, ev, n, points);
-    const evs_tile_grid_t grid = u->grid;
+    if (u->tiles == NULL) {
+        const evs_tile_grid_t grid = u->grid;
+        for (size_t i = 0u; i < n; i++) { tiles[i] = evs_tile_of_point(&grid, points[i]); }
+        return;
+    }
     const uint16_t *const table = u->tiles;
     const sensor_t sensor = sensor_of(u);
     for (size_t i = 0u; i < n; i++) {
-        if (table == NULL) {
-            tiles[i] = evs_tile_of_point(&grid, points[i]);
-        } else {
-            const uint32_t pixel = pixel_of(&ev[i]);
-            tiles[i] = is_on(sensor, pixel) ? table[index_of(sensor, pixel)] : EVS_TILE_NONE;
-        }
+        const pixel_t pixel = pixel_of(&ev[i]);
+        tiles[i] = is_on(sensor, pixel) ? table[index_of(sensor, pixel)] : EVS_TILE_NONE;
     }
 }
 

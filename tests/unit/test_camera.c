@@ -378,6 +378,28 @@ static void test_every_ray_inside_the_domain_is_found_again(void)
     }
 }
 
+static void test_iteration_does_not_cycle_on_a_lens_that_bends_both_ways(void)
+{
+    /* Found by the property test: plain Newton jumps to and fro between two sides of an inflection. */
+    const evs_camera_t fisheye = camera_with(EVS_CAMERA_FISHEYE, -0.00019, 0.00551, 0.09793, -0.04152, 0.0);
+    const evs_camera_t pinhole = camera_with(EVS_CAMERA_PINHOLE, 0.13359, 0.41831, -0.00028, 0.00351, -0.16802);
+    const evs_camera_t steep = camera_with(EVS_CAMERA_PINHOLE, 0.35835, 0.44667, -0.00435, -0.00209, -0.02171);
+    const evs_camera_t *const lenses[] = {&fisheye, &pinhole, &steep};
+    for (int k = 0; k < 3; k++) {
+        const double domain = fmin((double)evs_camera_domain_q32(lenses[k]) / 4294967296.0, (k == 0) ? 1.4 : 3.5);
+        for (int i = 1; i <= 190; i++) {
+            const double t = domain * i / 200.0;
+            const double r = (k == 0) ? tan(t) : t;
+            const evs_camera_px_t ideal = px_of(119.5 + 120.0 * r, 89.5 - 160.0 * r);
+            evs_camera_px_t there;
+            TEST_ASSERT_EQUAL_INT(EVS_OK, evs_camera_distort(lenses[k], ideal, &there));
+            TEST_ASSERT_EQUAL_INT(EVS_OK, evs_camera_undistort(lenses[k], there, &out));
+            TEST_ASSERT_DOUBLE_WITHIN(0.01, px_x(ideal), px_x(out));
+            TEST_ASSERT_DOUBLE_WITHIN(0.01, px_y(ideal), px_y(out));
+        }
+    }
+}
+
 static void test_answer_beyond_2047_px_is_outside_though_its_ray_exists(void)
 {
     const evs_camera_t cam = camera_with(EVS_CAMERA_FISHEYE, 0.0, 0.0, 0.0, 0.0, 0.0);
@@ -520,6 +542,7 @@ int main(void)
     RUN_TEST(test_barrel_that_folds_over_is_used_up_to_the_fold_and_no_further);
     RUN_TEST(test_no_pixel_is_given_an_answer_that_does_not_lead_back_to_it);
     RUN_TEST(test_every_ray_inside_the_domain_is_found_again);
+    RUN_TEST(test_iteration_does_not_cycle_on_a_lens_that_bends_both_ways);
     RUN_TEST(test_answer_beyond_2047_px_is_outside_though_its_ray_exists);
     RUN_TEST(test_fisheye_sees_past_90_degrees);
     RUN_TEST(test_fisheye_that_folds_over_is_used_up_to_the_fold_and_no_further);
