@@ -171,6 +171,14 @@ static bool make_table(const evh_calib_t *calib, const char *source, const char 
                         evs_status_name(status));
     }
     for (size_t i = 0u; i < n_points; i++) { n_outside += evs_point_is_outside(points[i]) ? 1u : 0u; }
+    if (n_outside > n_points / 2u) {
+        free(points);
+        return evh_fail(
+            err,
+            "%s: most of the sensor (%zu of %zu points) has no undistorted position under this lens model; check the "
+            "distortion coefficients",
+            source, n_outside, n_points);
+    }
     ok = write_header(out, name, source, calib, step_px, points, n_points, err);
     free(points);
     if (ok) {

@@ -125,8 +125,8 @@ static int replay(const evt_replay_t *r)
     evh_error_t summary_err = {""};
     const bool ok = evt_replay_run(r, opt.output, &result, &err);
     bool written = true;
-    report(r, &result);
-    if (result.n_events > 0u) { /* Also after a failure: what was read is there, and the summary says how far. */
+    if (result.n_events > 0u) {
+        report(r, &result); /* Also after a failure: what was read is there, and the summary says how far. */
         written = evt_replay_write_summary(r, &opt, &result, opt.output, ok ? NULL : err.text, &summary_err);
     }
     if (!ok || !written) {

@@ -215,6 +215,10 @@ static bool run_all(run_t *run, size_t n_first, evh_error_t *err)
     }
     evs_pipeline_finish(&run->pipeline);
     pull_all(run);
+    if (ok && (n == 0) && (result->n_no_undistorted == result->n_out)) {
+        return evh_fail(
+            err, "no event has an undistorted position under this lens model; check the distortion coefficients");
+    }
     return ok && (n == 0);
 }
 

@@ -247,7 +247,8 @@ static ssize_t read_events(evh_event_source_t *base, evs_event_t *ev, int64_t *t
                 err,
                 "%s: none of the first %u lines is an event (\"t x y p\", on a %ux%u sensor); the first fault is in "
                 "line %" PRIu64 "; is this the right file, the right --size?",
-                base->path, GIVE_UP_LINES, (unsigned)base->width_px, (unsigned)base->height_px, self->lines.line);
+                base->path, GIVE_UP_LINES, (unsigned)base->width_px, (unsigned)base->height_px,
+                evh_tally_first_line(&base->tally));
             return -1;
         }
     }

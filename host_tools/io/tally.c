@@ -30,6 +30,17 @@ uint64_t evh_tally_skipped(const evh_tally_t *tally)
     return sum;
 }
 
+uint64_t evh_tally_first_line(const evh_tally_t *tally)
+{
+    uint64_t first = 0u;
+    for (int i = EVH_FAULT_NONE + 1; i < EVH_FAULT_COUNT; i++) {
+        if ((tally->n_fault[i] > 0u) && ((first == 0u) || (tally->first_line[i] < first))) {
+            first = tally->first_line[i];
+        }
+    }
+    return first;
+}
+
 const char *evh_fault_text(evh_fault_t fault) { return FAULTS[fault].text; }
 const char *evh_fault_key(evh_fault_t fault) { return FAULTS[fault].key; }
 

@@ -30,6 +30,9 @@ typedef struct {
 void evh_tally_fault(evh_tally_t *tally, evh_fault_t fault, uint64_t line);
 uint64_t evh_tally_skipped(const evh_tally_t *tally);
 
+/** The line of the first fault of any cause; 0 when there is none. */
+uint64_t evh_tally_first_line(const evh_tally_t *tally);
+
 /** Words for a message ("malformed") and for a JSON key ("malformed"). */
 const char *evh_fault_text(evh_fault_t fault);
 const char *evh_fault_key(evh_fault_t fault);

@@ -1,0 +1,389 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+# SPDX-FileCopyrightText: 2026 the evstab authors
+"""Runs the program evstab as a user would, above all wrongly: each case names the exit status and the words that must be
+told. Errors are one line on stderr; nothing may crash, and nothing may pass silently.
+
+usage: test_cli.py EVSTAB CC LIB_INCLUDE_DIR
+"""
+import csv
+import gzip
+import json
+import math
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+
+EVSTAB, CC, INCLUDE = sys.argv[1:4]
+ROOT = pathlib.Path(tempfile.mkdtemp(prefix="evstab_cli_"))
+FAULTS = 0
+N_CHECKS = 0
+
+
+def check(case, ok, detail=""):
+    global FAULTS, N_CHECKS
+    N_CHECKS += 1
+    if not ok:
+        FAULTS += 1
+        print(f"FAIL {case}: {detail}")
+
+
+def run(*arguments, **options):
+    done = subprocess.run([EVSTAB, *map(str, arguments)], capture_output=True, cwd=ROOT, timeout=60, **options)
+    done.stdout = done.stdout.decode(errors="replace")
+    done.stderr = done.stderr.decode(errors="replace")
+    return done
+
+
+def expect(case, arguments, status, *patterns, n_lines=None, **options):
+    """Exit status, and every pattern on stderr (or on stdout when it begins with '>'). @return the process."""
+    done = run(*arguments, **options)
+    check(case, done.returncode == status, f"exit {done.returncode}, expected {status}; stderr: {done.stderr}")
+    for pattern in patterns:
+        stream, text = (done.stdout, pattern[1:]) if pattern.startswith(">") else (done.stderr, pattern)
+        check(case, re.search(text, stream) is not None, f"'{text}' not in: {stream}")
+    check(case, "Sanitizer" not in done.stderr and "runtime error" not in done.stderr, done.stderr)
+    errors = [line for line in done.stderr.splitlines() if not line.startswith("evstab: note:")]
+    if status != 0:
+        check(case, len(errors) >= 1, "failed silently")
+    if n_lines is not None:
+        check(case, len(errors) == n_lines, f"{len(errors)} lines on stderr, expected {n_lines}: {done.stderr}")
+    return done
+
+
+def write(name, content):
+    path = ROOT / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+def summary(folder):
+    return json.loads((ROOT / folder / "summary.json").read_text())
+
+
+CALIB = "200 200 120 90 -0.3 0.1 0 0 0\n"
+
+
+def events(n=2000, t0=1.0, step=0.0001):
+    return "".join(f"{t0 + i * step:.9f} {i * 7 % 240} {i * 5 % 180} {i & 1}\n" for i in range(n))
+
+
+def imu(n=400, t0=0.9, order="accel"):
+    rows = []
+    for i in range(n):
+        gyro, accel = f"0.1 {0.5 * math.sin(i * 0.02):.6f} -0.2", "0.3 -9.7 0.2"
+        rows.append(f"{t0 + i * 0.001:.6f} " + (f"{accel} {gyro}" if order == "accel" else f"{gyro} {accel}"))
+    return "\n".join(rows) + "\n"
+
+
+def poses(n=100, t0=0.9):
+    return "".join(f"{t0 + i * 0.005:.6f} 0 0 0 0 {math.sin(i * 0.002):.9f} 0 {math.cos(i * 0.002):.9f}\n" for i in range(n))
+
+
+def recording(name, **files):
+    parts = {"events.txt": events(), "imu.txt": imu(), "groundtruth.txt": poses(), "calib.txt": CALIB}
+    parts.update({key.replace("_txt", ".txt"): value for key, value in files.items()})
+    for file, content in parts.items():
+        if content is not None:
+            write(f"{name}/{file}", content)
+    return ROOT / name
+
+
+def test_usage():
+    expect("no command", [], 2, "Usage: evstab")
+    expect("help", ["--help"], 0, ">replay", ">attitude", ">lut", ">info", n_lines=0)
+    expect("version", ["--version"], 0, r">^evstab \d+\.\d+\.\d+$", n_lines=0)
+    expect("unknown command", ["frobnicate"], 2, "unknown command 'frobnicate'", n_lines=1)
+    for later in ("demo", "sim", "egomotion", "eval", "convert", "bench", "view", "live"):
+        expect("a command that is not there yet", [later], 2, f"unknown command '{later}'", n_lines=1)
+        check("help lists only what exists", f"  {later} " not in run("--help").stdout, later)
+    for command in ("replay", "attitude", "lut", "info"):
+        expect(f"{command} --help", [command, "--help"], 0, f">Usage: evstab {command}", ">Exit status", n_lines=0)
+        expect(f"{command} without input", [command], 2, f"evstab {command}: ", f"evstab {command} --help", n_lines=1)
+        expect(f"{command} --what", [command, "x", "--what"], 2, "unknown option '--what'", n_lines=1)
+        expect(f"{command} a b", [command, "a", "b", "-o", "x"] if command != "info" else [command, "a", "b"], 2,
+               "one word too many: 'b'", n_lines=1)
+    for later in ("--image=iwe", "--warp=tiled", "--velocity=on", "--video=a.mp4", "--writ=events", "--i"):
+        expect("an option of a later module", ["replay", "x", "-o", "y", later], 2, "unknown option", n_lines=1)
+    for option, value in (("--window", "area:34x26"), ("--window", "count:0"), ("--window", "time:1.5"), ("--window", "roi:1"),
+                          ("--window", "area:0x26:200"), ("--window", "area:34x26:99999"), ("--rotation", "both"),
+                          ("--saccade", "1"), ("--attitude", "magic"), ("--imu-offset-us", "1ms"), ("--imu-offset-us", "99999999"),
+                          ("--from", "now"), ("--to", ""), ("--size", "240"), ("--size", "240x0"), ("--size", "4096x4096"),
+                          ("--write", "frames"), ("--write", "events,frames"), ("--imu-order", "gyro")):
+        folder = recording("usage")
+        expect(f"{option} {value}", ["replay", folder, "-o", "out_usage", option, value], 2, option, n_lines=1)
+    expect("value missing", ["replay", "x", "-o"], 2, "--output needs a value", n_lines=1)
+    expect("given twice", ["replay", "x", "-o", "a", "-o", "b"], 2, "given twice", n_lines=1)
+    expect("a flag with a value", ["replay", "x", "-o", "a", "--paper=yes"], 2, "--paper takes no value", n_lines=1)
+    expect("from after to", ["replay", "x", "-o", "a", "--from", "2", "--to", "1"], 2, "--from", n_lines=1)
+    check("nothing written by wrong usage", not (ROOT / "out_usage").exists())
+
+
+def test_replay():
+    folder = recording("good")
+    done = expect("all defaults", ["replay", folder, "-o", "out/a/b", "--write", "events"], 0, "attitude: imu", "240x180 is taken",
+                  ">2000 events", n_lines=0)
+    check("no progress when piped", "\r" not in done.stderr)
+    s = summary("out/a/b")
+    check("counts", s["events"]["in"] == s["events"]["replayed"] == s["events"]["kept"] == 2000, s["events"])
+    check("settings", s["settings"]["attitude"] == "imu" and s["settings"]["rotation"] == "slice", s["settings"])
+    headers = {"attitude.csv": "#t_s,qw,qx,qy,qz,wx_rad_s,wy_rad_s,wz_rad_s,flags",
+               "windows.csv": "#index,first_event,n_events,t_first_s,t_last_s,reason,saccade,qw,qx,qy,qz",
+               "events.csv": "#t_s,x_px,y_px,p,x_undist_px,y_undist_px,x_stab_px,y_stab_px,window"}
+    for name, header in headers.items():
+        rows = (ROOT / "out/a/b" / name).read_text().splitlines()
+        check(f"header of {name}", rows[0] == header, rows[0])
+        check(f"columns of {name}", {row.count(",") for row in rows} == {header.count(",")})
+    rows = (ROOT / "out/a/b/events.csv").read_text().splitlines()
+    check("a row per event", len(rows) == 2001, len(rows))
+    check("exact times", rows[1].startswith("1.000000,0,0,0,") and rows[1236].startswith("1.123500,"), rows[1])
+    check("no events.csv unless asked", expect("quiet", ["replay", folder, "-o", "out/q", "-q"], 0, n_lines=0).stderr == "" and
+          not (ROOT / "out/q/events.csv").exists())
+    check("quiet prints nothing", run("replay", folder, "-o", "out/q", "-q").stdout == "")
+
+    again = run("replay", folder, "-o", "out/again", "--write", "events", "-q")
+    check("same input, same bytes", again.returncode == 0 and
+          (ROOT / "out/again/events.csv").read_bytes() == (ROOT / "out/a/b/events.csv").read_bytes())
+
+    for attitude in ("gyro", "truth", "none"):
+        expect(attitude, ["replay", folder, "-o", f"out/{attitude}", "--attitude", attitude], 0, n_lines=0)
+        check(attitude, summary(f"out/{attitude}")["settings"]["attitude"] == attitude)
+    check("without orientations there are none in the file", len((ROOT / "out/none/attitude.csv").read_text().splitlines()) == 1)
+    expect("truth without IMU", ["replay", recording("no_imu", imu_txt=None), "-o", "out/t"], 0, "attitude: truth")
+    expect("neither", ["replay", recording("bare", imu_txt=None, groundtruth_txt=None), "-o", "out/n"], 0, "attitude: none")
+    expect("gyro-first IMU is noticed", ["replay", recording("gyro_first", imu_txt=imu(order="gyro")), "-o", "out/gf"], 0, "look like gravity")
+    a = (ROOT / "out/gf/attitude.csv").read_bytes()
+    check("and read rightly", a == (ROOT / "out/q/attitude.csv").read_bytes())
+    expect("units of g are noticed", ["replay", recording("in_g", imu_txt=imu().replace("-9.7", "-0.99")), "-o", "out/g"], 0, "not about 9.8")
+
+    expect("count windows", ["replay", folder, "-o", "out/c", "--window", "count:100"], 0, ">20 windows")
+    expect("time windows", ["replay", folder, "-o", "out/tw", "--window", "time:50000"], 0, ">4 windows")
+    expect("part of it", ["replay", folder, "-o", "out/part", "--from", "1.05", "--to", "1.1"], 0, ">500 events")
+    check("what was left out is counted", summary("out/part")["events"]["before_from"] == 500, summary("out/part")["events"])
+    expect("none of it", ["replay", folder, "-o", "out/none_of_it", "--from", "5"], 1, "no event between", n_lines=1)
+    check("no litter", not (ROOT / "out/none_of_it").exists())
+    expect("paper", ["replay", folder, "-o", "out/p", "--paper"], 0)
+    p = summary("out/p")["settings"]
+    check("paper", (p["rotation"], p["window"], p["saccade_px"]) == ("window", "area:34x26:200", 40), p)
+    expect("paper on another sensor", ["replay", folder, "-o", "out/p", "--paper", "--size", "346x260"], 0)
+    check("threshold by sensor", summary("out/p")["settings"]["window"] == "area:34x26:50")
+    write("good.yaml", "K: [210, 0, 121, 0, 211, 91, 0, 0, 1]\nD: [0, 0, 0, 0, 0]\nimage_width: 240\nimage_height: 180\n"
+                       "q_external: [0, 0, 1, 0]\naccumulation_type: number_of_events\nnumber_of_accumulated_events: 250\n"
+                       "enable_saccades: False\nfrobnicate: 1\n")
+    expect("parameters of the paper's code", ["replay", folder, "-o", "out/y", "--config", "good.yaml"], 0, "keys not used: frobnicate",
+           ">8 windows")
+    y = summary("out/y")["settings"]
+    check("are used", y["camera"]["fx_px"] == 210 and y["saccade_px"] == 0 and y["q_camera_from_imu_wxyz"] == [0, 0, 0, 1], y)
+
+    shutil.rmtree(ROOT / "gz", ignore_errors=True)
+    for name, content in (("events.txt", events()), ("imu.txt", imu()), ("calib.txt", CALIB), ("groundtruth.txt", poses())):
+        write(f"gz/{name}.gz", gzip.compress(content.encode()))
+    expect("gzip", ["replay", "gz", "-o", "out/gz", "--write", "events", "-q"], 0)
+    check("reads the same", (ROOT / "out/gz/events.csv").read_bytes() == (ROOT / "out/a/b/events.csv").read_bytes())
+
+    epoch = 1403715273
+    recording("epoch", events_txt=events(t0=epoch), imu_txt=imu(t0=epoch - 0.1), groundtruth_txt=None)
+    expect("times since 1970", ["replay", "epoch", "-o", "out/epoch", "--write", "events", "-q"], 0)
+    row = (ROOT / "out/epoch/events.csv").read_text().splitlines()[1000]
+    check("keep their microseconds", re.match(rf"{epoch}\.0999\d\d,", row) is not None, row)
+    expect("clocks that do not meet", ["replay", recording("apart", imu_txt=imu(t0=500)), "-o", "out/apart"], 0, "have no orientation", n_lines=1)
+
+
+def test_bad_input():
+    good = events()
+    calib = write("calib.txt", CALIB)
+
+    def replay(case, content, status, *patterns, n_lines=1, extra=()):
+        name = re.sub(r"\W+", "_", case)
+        path = write(f"bad/{name}.txt", content)
+        return expect(case, ["replay", path, "--calib", calib, "-o", f"out/bad/{name}", "--attitude", "none", *extra], status, *patterns,
+                      n_lines=n_lines), f"out/bad/{name}"
+
+    expect("missing file", ["replay", "nowhere.txt", "-o", "o"], 1, "nowhere.txt: No such file", n_lines=1)
+    expect("missing calibration", ["replay", write("bad/alone.txt", good), "-o", "o"], 1, "no calibration; give --calib", n_lines=1)
+    (ROOT / "empty_folder").mkdir()
+    expect("empty folder", ["replay", "empty_folder", "-o", "o"], 1, "no events in this folder", n_lines=1)
+    expect("folder for a file", ["replay", "bad/alone.txt", "--calib", "empty_folder", "-o", "o"], 1, "is a folder", n_lines=1)
+    expect("missing IMU", ["replay", "bad/alone.txt", "--calib", calib, "--attitude", "imu", "-o", "o"], 1, "give --imu FILE", n_lines=1)
+    expect("missing poses", ["replay", "bad/alone.txt", "--calib", calib, "--attitude", "truth", "-o", "o"], 1, "give --poses FILE", n_lines=1)
+    expect("IMU file that is not there", ["replay", "bad/alone.txt", "--calib", calib, "--imu", "no.txt", "-o", "o"], 1, "no.txt: no such file")
+
+    replay("empty file", "", 1, "holds no event")
+    replay("only blank lines", "\n\n\n", 1, "holds no event")
+    replay("binary garbage", bytes(i * 7919 % 256 for i in range(200000)), 1, "is this the right file|no usable event")
+    replay("zeros", bytes(100000), 1, "no usable event")
+    replay("another kind of file", imu(5000), 1, "is this the right file")
+    replay("png", b"\x89PNG\r\n\x1a\n" + bytes(500), 1, "no usable event")
+
+    def skipped(case, line, cause, key):
+        rows = good.splitlines()
+        content = "\n".join(rows[:5] + [line] + rows[5:]) + "\n"
+        _, out = replay(case, content, 0, rf"skipped 1 line of .*: 1 {cause}.* \(first: line 6\)")
+        counted = summary(out)["events"]
+        check(case, counted["bad"][key] == 1 and counted["replayed"] == 2000 and counted["in"] == 2001, counted)
+
+    skipped("three columns", "1.00005 12 13", "malformed", "malformed")
+    skipped("five columns", "1.00005 12 13 1 9", "malformed", "malformed")
+    skipped("words", "hello world", "malformed", "malformed")
+    skipped("NaN", "nan 12 13 1", "with NaN or infinity", "not_finite")
+    skipped("x off the sensor", "1.00005 240 13 1", "off the sensor", "off_sensor")
+    skipped("negative y", "1.00005 2 -13 1", "off the sensor", "off_sensor")
+    skipped("1e9 in x", "1.00005 1000000000 13 1", "off the sensor", "off_sensor")
+    skipped("1e9 in time", "1000000000 12 13 1", "where time jumps", "time_jump")
+    skipped("1e30 in time", "1e30 12 13 1", "malformed", "malformed")
+    skipped("time runs back", "0.5 12 13 1", "where time runs back", "time_back")
+    skipped("control characters", "1.00005\x00 12 13 1", "malformed", "malformed")
+    replay("truncated last line", good[:-8], 0, "1 malformed \\(first: line 2000\\)")
+    replay("missing last line end", good[:-1], 0, ">2000 events", n_lines=0)
+    replay("CR LF", good.replace("\n", "\r\n"), 0, ">2000 events", n_lines=0)
+    replay("exponents", "".join(f"{1 + i * 1e-4:.18e} {i % 240:.6e} {i % 180:.6e} 1.0e+00\n" for i in range(100)), 0, ">100 events", n_lines=0)
+    replay("one event", "1.0 1 1 1\n", 0, ">1 events", n_lines=0)
+    replay("many faults", good + "x\n1.3 999 1 1\n1.3 1 1\n0.1 1 1 1\n", 0,
+           r"skipped 4 lines of many_faults\.txt: 2 malformed \(first: line 2001\), 1 off the sensor \(first: line 2002\), "
+           r"1 where time runs back \(first: line 2004\)")
+    packed = gzip.compress(os.urandom(3000).hex().encode() + b"\n" + good.encode())
+    replay("truncated gzip", packed[: len(packed) * 3 // 4], 1, "truncated", n_lines=2)
+    damaged = bytearray(gzip.compress(good.encode()))
+    for i in range(len(damaged) // 2, len(damaged) // 2 + 40):
+        damaged[i] ^= 0x55
+    replay("damaged gzip", bytes(damaged), 1, "damaged gzip|truncated|no usable event", n_lines=None)
+
+    expect("output is a file", ["replay", "good", "-o", "calib.txt"], 1, "calib.txt: cannot create the output folder: a file of that name exists", n_lines=1)
+    if os.geteuid() != 0:
+        (ROOT / "locked").mkdir()
+        (ROOT / "locked").chmod(0o500)
+        expect("unwritable output", ["replay", "good", "-o", "locked/x"], 1, "cannot create the output folder: Permission denied", n_lines=1)
+    expect("output below /proc", ["replay", "good", "-o", "/proc/evstab_cannot_be"], 1, "cannot create the output folder", n_lines=1)
+    (ROOT / "blocked" / "events.csv").mkdir(parents=True)
+    expect("output file blocked", ["replay", "good", "-o", "blocked", "--write", "events"], 1, "blocked/events.csv: cannot write", n_lines=1)
+
+    for case, text, pattern in (("zero focal length", "0 200 120 90 0 0 0 0 0\n", "focal length fx 0"),
+                                ("empty calibration", "", "holds 0 numbers"),
+                                ("NaN in calibration", "nan 200 120 90\n", "focal length"),
+                                ("1e9 in calibration", "200 200 1000000000 90\n", "principal point"),
+                                ("words in calibration", "fx fy cx cy\n", "line 1"),
+                                ("lens that folds over", "200 200 120 90 -8000 0 0 0 0\n", "check the distortion coefficients")):
+        path = write("bad/calib.txt", text)
+        expect(case, ["replay", "bad/alone.txt", "--calib", path, "-o", "out/bad/c", "--attitude", "none"], 1, pattern, n_lines=1)
+    write("bad/broken.yaml", "K: [1, 2\n")
+    expect("broken YAML", ["replay", "good", "--config", "bad/broken.yaml", "-o", "o"], 1, "bad/broken.yaml: line 2: not YAML", n_lines=1)
+    expect("missing YAML", ["replay", "good", "--config", "no.yaml", "-o", "o"], 1, "no.yaml: No such file", n_lines=1)
+    expect("too many tiles", ["replay", "good", "-o", "o", "--window", "area:300x26:200"], 1, "300x26 tiles do not fit", n_lines=1)
+
+    lines = imu().splitlines()
+    lines[100] = lines[100].replace("-9.7", "nan")
+    lines[110] = "1e9 " + lines[110].split(" ", 1)[1]
+    lines[120] = lines[119]
+    lines[130] = "x"
+    lines[140] = lines[140].replace("0.1 ", "1000000000 ")
+    recording("bad_imu", imu_txt="\n".join(lines))
+    expect("bad IMU lines", ["replay", "bad_imu", "-o", "out/bad_imu"], 0,
+           r"skipped 5 lines of imu\.txt: 1 malformed \(first: line 131\), 1 with NaN or infinity \(first: line 101\), 1 with a value out of "
+           r"range \(first: line 141\), 1 where time runs back \(first: line 121\), 1 where time jumps .* \(first: line 111\)", n_lines=1)
+    expect("empty IMU", ["replay", recording("empty_imu", imu_txt=""), "-o", "o"], 1, "imu.txt: holds no usable sample", n_lines=1)
+    expect("IMU of another kind", ["replay", recording("odd_imu", imu_txt=events()), "-o", "o"], 1, "imu.txt: ", n_lines=1)
+    recording("bad_poses", imu_txt=None, groundtruth_txt=poses() + "1.5 0 0 0 0 0 0 0\n1.6 0 0 0 nan 0 0 1\n")
+    expect("bad poses", ["replay", "bad_poses", "-o", "out/bad_poses"], 0, r"skipped 2 lines of groundtruth\.txt", n_lines=1)
+
+
+def test_attitude():
+    header = "t_s,gx_rad_s,gy_rad_s,gz_rad_s,ax_m_s2,ay_m_s2,az_m_s2\n"
+    rows = [f"{i * 0.01:.6f},0,0,0.5,0,0,9.81" for i in range(500)]
+    write("imu.csv", header + "\n".join(rows) + "\n")
+    expect("attitude", ["attitude", "imu.csv", "-o", "q.csv"], 0, ">500 rows, 0 of them", n_lines=0)
+    with open(ROOT / "q.csv", newline="") as file:
+        table = list(csv.reader(file))
+    check("header", table[0] == ["t_s", "qw", "qx", "qy", "qz"], table[0])
+    check("one row per row", len(table) == 501, len(table))
+    check("times", table[2][0] == "0.010000" and table[500][0] == "4.990000", table[2])
+    q = list(map(float, table[500][1:]))
+    check("unit", abs(sum(v * v for v in q) - 1) < 1e-8, q)
+    yaw = 2 * math.atan2(q[3], q[0])
+    check("a turn of 0.5 rad/s about the vertical", abs(yaw - 0.5 * 4.99) < 0.01, yaw)
+    expect("gzip", ["attitude", write("imu.csv.gz", gzip.compress((header + "\n".join(rows)).encode())), "-o", "q2.csv"], 0)
+    check("reads the same", (ROOT / "q.csv").read_bytes() == (ROOT / "q2.csv").read_bytes())
+    for mode in ("gyro", "valenti"):
+        expect(mode, ["attitude", "imu.csv", "-o", "q3.csv", "--mode", mode], 0, n_lines=0)
+    expect("wrong mode", ["attitude", "imu.csv", "-o", "q3.csv", "--mode", "kalman"], 2, "expected filter, gyro or valenti", n_lines=1)
+
+    bad = list(rows)
+    bad[0] = "x" + bad[0]
+    bad[7] = "0.07,nan,0,0.5,0,0,9.81"
+    bad[8] = "0.08,0,0"
+    bad[9] = "1000000000,0,0,0.5,0,0,9.81"
+    bad[10] = "0.05,0,0,0.5,0,0,9.81"
+    bad[11] = ",,,,,,"
+    write("imu_bad.csv", header + "\n".join(bad))
+    expect("bad rows", ["attitude", "imu_bad.csv", "-o", "q.csv"], 0, r"skipped 6 lines of imu_bad\.csv: 3 malformed", ">500 rows, 6 of them", n_lines=1)
+    table = (ROOT / "q.csv").read_text().splitlines()
+    check("still one row per row", len(table) == 501, len(table))
+    check("which repeat the last orientation", len({row.split(",", 1)[1] for row in table[7:13]}) == 1, table[7:13])
+    check("a bad row keeps its time", table[8].startswith("0.070000,"), table[8])
+
+    expect("no header", ["attitude", write("nohead.csv", "0,0,0,0,0,0,9.8\n"), "-o", "q.csv"], 1, "line 1: no header names the columns", n_lines=1)
+    expect("missing column", ["attitude", write("short.csv", "t_s,gx_rad_s,gy_rad_s\n0,0,0\n"), "-o", "q.csv"], 1,
+           "gz_rad_s, ax_m_s2, ay_m_s2, az_m_s2", n_lines=1)
+    expect("empty", ["attitude", write("empty.csv", ""), "-o", "q.csv"], 1, "holds no sample", n_lines=1)
+    expect("header alone", ["attitude", write("head.csv", header), "-o", "q.csv"], 1, "holds no sample", n_lines=1)
+    expect("missing", ["attitude", "no.csv", "-o", "q.csv"], 1, "no.csv: No such file", n_lines=1)
+    expect("no output", ["attitude", "imu.csv"], 2, "-o Q.csv is missing", n_lines=1)
+    expect("unwritable", ["attitude", "imu.csv", "-o", "/nowhere/q.csv"], 1, "/nowhere/q.csv: cannot write", n_lines=1)
+    if os.path.exists("/dev/full"):
+        expect("disk full", ["attitude", "imu.csv", "-o", "/dev/full"], 1, "No space left", n_lines=1)
+
+
+def test_lut():
+    for arguments in (["calib.txt", "--size", "240x180"], ["calib.txt", "--step", "8", "--name", "lens"], ["good.yaml", "--step", "32"]):
+        expect("lut", ["lut", *arguments, "-o", "camera-lut.h"], 0, ">camera-lut.h: ", n_lines=0)
+        name = "lens" if "--name" in arguments else "camera_lut"
+        text = (ROOT / "camera-lut.h").read_text()
+        check("tells its inputs", "fx 2" in text and "distortion" in text and arguments[0] in text)
+        write("use.c", f'#include "camera-lut.h"\n#include "evs/undistort.h"\nint main(void)\n{{\n    evs_undistort_t u;\n'
+                       f"    return (int)evs_undistort_bind(&u, {name.upper()}_WIDTH_PX, {name.upper()}_HEIGHT_PX, {name.upper()}_STEP_PX, {name},\n"
+                       f"                                   sizeof {name} / sizeof {name}[0]);\n}}\n")
+        done = subprocess.run([CC, "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wconversion", "-fsyntax-only", f"-I{INCLUDE}", "use.c"],
+                              cwd=ROOT, capture_output=True, text=True)
+        check("the header compiles", done.returncode == 0, done.stderr)
+    expect("odd step", ["lut", "calib.txt", "-o", "x.h", "--step", "3"], 2, "expected 1, 2, 4", n_lines=1)
+    expect("odd name", ["lut", "calib.txt", "-o", "x.h", "--name", "a b"], 2, "expected a short C name", n_lines=1)
+    expect("no camera", ["lut", write("none.yaml", "a: 1\n"), "-o", "x.h"], 1, "no camera in it", n_lines=1)
+    expect("folds over", ["lut", write("fold.txt", "200 200 120 90 -8000 0 0 0 0\n"), "-o", "x.h"], 1, "check the distortion coefficients", n_lines=1)
+    expect("unwritable", ["lut", "calib.txt", "-o", "/nowhere/x.h"], 1, "cannot write", n_lines=1)
+    check("no litter", not (ROOT / "x.h").exists())
+
+
+def test_info():
+    expect("folder", ["info", "good"], 0, ">2000 events", ">imu.txt: 400 samples", ">100 poses", ">fx 200", ">not there images", n_lines=0)
+    expect("events", ["info", "good/events.txt"], 0, ">0.199900 s", ">10005 events/s", n_lines=0)
+    expect("imu", ["info", "good/imu.txt"], 0, ">1000.0 Hz", n_lines=0)
+    expect("poses", ["info", "good/groundtruth.txt"], 0, ">200.0 Hz", n_lines=0)
+    expect("calib", ["info", "calib.txt"], 0, ">pinhole", n_lines=0)
+    expect("yaml", ["info", "good.yaml"], 0, ">fx 210", n_lines=0)
+    expect("bad lines", ["info", "bad/many_faults.txt", "--size", "240x180"], 0, ">skipped 4 lines", n_lines=0)
+    expect("missing", ["info", "nowhere"], 1, "No such file", n_lines=1)
+    expect("empty", ["info", "empty.csv"], 1, "the file is empty", n_lines=1)
+    expect("garbage", ["info", "bad/png.txt"], 1, "unknown format", n_lines=1)
+    expect("empty folder", ["info", "empty_folder"], 1, "no recording in this folder", n_lines=1)
+    expect("two windows", ["info", write("two/events_1.txt", events()).parent], 0, ">2000 events")
+    write("two/events_2.txt", events())
+    expect("two windows", ["info", "two"], 1, "holds several event files", n_lines=1)
+    expect("one damaged part does not hide the others", ["info", recording("part", calib_txt="0 0 0 0\n")], 1, "focal length", ">2000 events",
+           ">400 samples", n_lines=1)
+
+
+def main():
+    try:
+        for test in (test_usage, test_replay, test_bad_input, test_attitude, test_lut, test_info):
+            test()
+    finally:
+        shutil.rmtree(ROOT, ignore_errors=True)
+    print(f"{N_CHECKS} checks, {FAULTS} failed")
+    sys.exit(1 if FAULTS else 0)
+
+
+main()
