@@ -6,7 +6,7 @@
  *
  * Mueggler et al., "The Event-Camera Dataset and Simulator", IJRR 36(2), 2017. doi:10.1177/0278364917691115
  * Columns are parted by blanks, tabs or commas; p is 0, 1, -1; '#' starts a comment line. Times are read exactly and
- * rounded to the nearest microsecond. Memory: one block. Speed: see tests/bench/bench_events_text.c.
+ * rounded to the nearest microsecond. Memory: one block. Speed: see tests/bench/bench_host_io.c.
  */
 #ifndef EVH_EVENTS_TEXT_H
 #define EVH_EVENTS_TEXT_H
