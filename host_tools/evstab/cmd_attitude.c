@@ -22,7 +22,7 @@ static const evt_option_t OPTIONS[] = {
     {"output", 'o', "Q.csv", "Where the orientations go. Needed.", &opt_out, NULL},
     {"mode", '\0', "MODE",
      "filter (default), gyro (integration alone) or valenti\n(the published complementary filter).", &opt_mode, NULL},
-    {"quiet", 'q', NULL, "No progress and no notes.", NULL, &opt_quiet},
+    {"quiet", 'q', NULL, "No progress, no notes, no closing line.", NULL, &opt_quiet},
 };
 
 static const evt_usage_t USAGE = {
@@ -117,8 +117,10 @@ static bool attitude(const char *in_path, const char *out_path, evs_attitude_mod
     if (ok && (imu.rows.tally.n_good == 0u)) { ok = evh_fail(err, "%s: holds no usable sample", in_path); }
     if (ok) {
         report_faults(evs_attitude_faults(&att));
-        (void)printf("%s: %" PRIu64 " rows, %" PRIu64 " of them repeat the last orientation\n", out_path, n_rows,
-                     evh_tally_skipped(&imu.rows.tally));
+        if (!evh_is_quiet()) {
+            (void)printf("%s: %" PRIu64 " rows, %" PRIu64 " of them repeat the last orientation\n", out_path, n_rows,
+                         evh_tally_skipped(&imu.rows.tally));
+        }
     }
     evh_imu_close(&imu);
     return ok;

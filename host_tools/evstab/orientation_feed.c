@@ -15,7 +15,7 @@ static bool is_imu(const evt_orientation_feed_t *feed)
     return (feed->kind == EVT_ATTITUDE_IMU) || (feed->kind == EVT_ATTITUDE_GYRO);
 }
 
-static void fetch(evt_orientation_feed_t *feed, evh_error_t *err)
+bool evt_orientation_feed_fetch(evt_orientation_feed_t *feed, evh_error_t *err)
 {
     if (is_imu(feed)) {
         feed->has_next = evh_imu_next(&feed->imu, &feed->next_imu, err);
@@ -24,6 +24,7 @@ static void fetch(evt_orientation_feed_t *feed, evh_error_t *err)
         feed->has_next = (feed->next_pose < feed->poses.n);
         if (feed->has_next) { feed->next_us = feed->poses.pose[feed->next_pose].t_us + feed->offset_us; }
     }
+    return err->text[0] == '\0';
 }
 
 bool evt_orientation_feed_open(evt_orientation_feed_t *feed, const evt_replay_t *r, evs_pipeline_t *pipeline,
@@ -40,7 +41,7 @@ bool evt_orientation_feed_open(evt_orientation_feed_t *feed, const evt_replay_t 
     }
     if ((feed->kind == EVT_ATTITUDE_TRUTH) && !evh_poses_read(&feed->poses, r->rec.poses, err)) { return false; }
     if (feed->kind != EVT_ATTITUDE_NONE) {
-        fetch(feed, err);
+        (void)evt_orientation_feed_fetch(feed, err);
         if (!feed->has_next) {
             return evh_fail(err, "%s: holds no usable sample; try another --attitude",
                             is_imu(feed) ? r->rec.imu : r->rec.poses);
@@ -81,8 +82,7 @@ static void push_pose(evt_orientation_feed_t *feed, evs_orientation_t *newest, b
     *known = (evs_pipeline_push_orientation(feed->pipeline, newest) == EVS_OK);
 }
 
-bool evt_orientation_feed_push(evt_orientation_feed_t *feed, evs_orientation_t *newest, uint32_t *flags, bool *known,
-                               evh_error_t *err)
+void evt_orientation_feed_push(evt_orientation_feed_t *feed, evs_orientation_t *newest, uint32_t *flags, bool *known)
 {
     if (is_imu(feed)) {
         evt_imu_feed(&feed->imu_feed, &feed->next_imu);
@@ -93,8 +93,6 @@ bool evt_orientation_feed_push(evt_orientation_feed_t *feed, evs_orientation_t *
         push_pose(feed, newest, known);
         *flags = EVS_ATTITUDE_TILT_KNOWN | EVS_ATTITUDE_HEADING_KNOWN;
     }
-    fetch(feed, err);
-    return err->text[0] == '\0';
 }
 
 void evt_orientation_feed_close(evt_orientation_feed_t *feed, evt_replay_result_t *result)

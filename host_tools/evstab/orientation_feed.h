@@ -28,12 +28,14 @@ bool evt_orientation_feed_open(evt_orientation_feed_t *feed, const evt_replay_t 
                                evh_error_t *err);
 
 /**
- * Push the next sample (feed->has_next) and fetch the one after it.
+ * Push the sample at hand (feed->has_next); evt_orientation_feed_fetch() gets the one after it.
  * @param[out] newest, flags  What attitude.csv tells; newest->t_us is by the sample's clock.
- * @return false when reading failed. @p known is false when the sample gave no orientation.
+ * @param[out] known  false when the sample gave no orientation.
  */
-bool evt_orientation_feed_push(evt_orientation_feed_t *feed, evs_orientation_t *newest, uint32_t *flags, bool *known,
-                               evh_error_t *err);
+void evt_orientation_feed_push(evt_orientation_feed_t *feed, evs_orientation_t *newest, uint32_t *flags, bool *known);
+
+/** Read on. @return false when reading failed; the end only clears feed->has_next. */
+bool evt_orientation_feed_fetch(evt_orientation_feed_t *feed, evh_error_t *err);
 
 void evt_orientation_feed_close(evt_orientation_feed_t *feed, evt_replay_result_t *result);
 

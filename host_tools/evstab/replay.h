@@ -32,7 +32,8 @@ typedef struct {
 /** What will be done: every default resolved. */
 typedef struct {
     evh_recording_t rec;
-    evh_calib_t calib; /**< With the sensor size that counts. */
+    const char *calib_path; /**< The file that it came from. */
+    evh_calib_t calib;      /**< With the sensor size that counts. */
     evt_attitude_t attitude;
     evh_imu_order_t imu_order;
     evs_pipeline_config_t pipeline;
@@ -62,7 +63,9 @@ typedef struct {
     uint64_t n_orientations;
     int64_t t_first_us, t_last_us;
     int64_t orientation_first_us, orientation_last_us; /**< By the events' clock. */
-    int64_t library_ns, wall_ns;
+    int64_t library_ns;                                /**< In the library, for events. */
+    int64_t attitude_ns;                               /**< In the library, for IMU samples or poses. */
+    int64_t wall_ns;
     evh_tally_t events_tally, imu_tally, poses_tally;
     evs_pipeline_counts_t counts;
     evs_attitude_faults_t attitude_faults;

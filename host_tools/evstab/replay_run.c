@@ -93,12 +93,13 @@ static bool push_orientations(run_t *run, int64_t until_us, evh_error_t *err)
         bool known = false;
         const int64_t t_us = run->feed.next_us;
         const int64_t start_ns = evt_now_ns();
-        if (!evt_orientation_feed_push(&run->feed, &newest, &flags, &known, err)) { return false; }
-        result->library_ns += evt_now_ns() - start_ns;
+        evt_orientation_feed_push(&run->feed, &newest, &flags, &known);
+        result->attitude_ns += evt_now_ns() - start_ns;
         run->newest_us = t_us;
         if (result->n_orientations++ == 0u) { result->orientation_first_us = t_us; }
         result->orientation_last_us = t_us;
         if (known) { evt_replay_put_orientation(&run->out, t_us, &newest, flags); }
+        if (!evt_orientation_feed_fetch(&run->feed, err)) { return false; }
     }
     return true;
 }

@@ -138,12 +138,15 @@ static bool settle_calib(evt_replay_t *r, const evt_replay_options_t *o, const e
             return evh_fail(err, "%s: no camera in it; needed are K and D, or intrinsics", o->calib);
         }
         r->calib = other.calib;
+        r->calib_path = o->calib;
     } else if ((o->calib != NULL) || (!config->has_calib && (r->rec.calib != NULL))) {
         if (!evh_calib_text_read(&r->calib, r->rec.calib, err)) { return false; }
+        r->calib_path = r->rec.calib;
         r->calib.width_px = config->calib.width_px; /* A size without K still helps. */
         r->calib.height_px = config->calib.height_px;
     } else if (config->has_calib) {
         r->calib = config->calib;
+        r->calib_path = (o->config != NULL) ? o->config : r->rec.config;
     } else {
         return evh_fail(
             err,
@@ -269,6 +272,23 @@ static void settle_pipeline(evt_replay_t *r, const evh_config_t *config)
     }
 }
 
+/* An IMU file in the place of the events, say. What cannot be told at once, the reader finds out. */
+static bool check_input_kind(const evt_replay_t *r, evh_error_t *err)
+{
+    static const char *const WHAT[] = {[EVH_KIND_IMU] = "IMU samples",
+                                       [EVH_KIND_POSES] = "poses",
+                                       [EVH_KIND_CALIB] = "a calibration",
+                                       [EVH_KIND_CONFIG] = "a YAML file",
+                                       [EVH_KIND_IMAGES] = "a list of images"};
+    evh_kind_t kind = EVH_KIND_UNKNOWN;
+    if (!evh_detect(r->rec.events, &kind, err)) { return false; }
+    if (((size_t)kind < sizeof WHAT / sizeof WHAT[0]) && (WHAT[kind] != NULL)) {
+        return evh_fail(err, "%s: looks like %s; expected events, \"t x y p\" lines, or a folder", r->rec.events,
+                        WHAT[kind]);
+    }
+    return true;
+}
+
 static bool settle(evt_replay_t *r, const evt_replay_options_t *o, bool *usage_fault, evh_error_t *err)
 {
     evh_config_t config;
@@ -285,6 +305,7 @@ static bool settle(evt_replay_t *r, const evt_replay_options_t *o, bool *usage_f
     if (r->rec.events == NULL) {
         return evh_fail(err, "%s: no events in this folder; expected events.txt or events.txt.gz", o->input);
     }
+    if (!check_input_kind(r, err)) { return false; }
     config_path = (o->config != NULL) ? o->config : r->rec.config;
     if ((config_path != NULL) && !evh_config_read(&config, config_path, err)) { return false; }
     if (!settle_calib(r, o, &config, usage_fault, err)) { return false; }

@@ -92,7 +92,7 @@ static void add_settings(cJSON *root, const evt_replay_t *r, const evt_replay_op
     add_text(s, "events", r->rec.events);
     add_text(s, "imu", r->rec.imu);
     add_text(s, "poses", r->rec.poses);
-    add_text(s, "calib", (o->calib != NULL) ? o->calib : r->rec.calib);
+    add_text(s, "calib", r->calib_path);
     add_text(s, "config", (o->config != NULL) ? o->config : r->rec.config);
     add_text(s, "attitude", evt_attitude_name(r->attitude));
     add_window(s, p);
@@ -123,6 +123,8 @@ static void add_events(cJSON *root, const evt_replay_result_t *x)
     add_count(outside, "no_orientation", x->n_unoriented);
     add_count(outside, "rotated_out_of_range", x->n_out_of_range);
     add_faults(e, "bad", &x->events_tally);
+    add_count(e, "time_back_in_library", x->counts.n_time_back); /* After a pause of more than 35 min, say. */
+    add_count(e, "clock_restarts", x->counts.n_restarts);
 }
 
 static void add_attitude(cJSON *root, const evt_replay_t *r, const evt_replay_result_t *x)
@@ -164,6 +166,9 @@ static void add_all(cJSON *root, const evt_replay_t *r, const evt_replay_options
     add_measure(root, "wall_s", (double)x->wall_ns * 1e-9);
     add_measure(root, "ns_per_event", (double)x->wall_ns / n);
     add_measure(root, "library_ns_per_event", (double)x->library_ns / n);
+    if (x->n_orientations > 0u) {
+        add_measure(root, "library_ns_per_sample", (double)x->attitude_ns / (double)x->n_orientations);
+    }
 }
 
 bool evt_replay_write_summary(const evt_replay_t *r, const evt_replay_options_t *options,

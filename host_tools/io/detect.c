@@ -109,7 +109,8 @@ bool evh_detect(const char *path, evh_kind_t *kind, evh_error_t *err)
         bool rest = false;
         size_t n;
         any = any || (line.length > 0u);
-        if (line.overlong || (line.length == 0u) || !is_text(&line)) { continue; }
+        if (line.overlong || !is_text(&line)) { break; } /* Binary. */
+        if (line.length == 0u) { continue; }
         *kind = kind_of_names(&line);
         if ((*kind == EVH_KIND_UNKNOWN) && is_yaml_line(&line)) { *kind = EVH_KIND_CONFIG; }
         if ((*kind == EVH_KIND_UNKNOWN) && (line.text[0] != '#')) {

@@ -255,9 +255,12 @@ static bool missing_columns(evh_rows_t *rows, const evh_layout_t *have, bool fro
         if ((missing & EVH_BIT(q)) == 0u) { continue; }
         at += (size_t)snprintf(list + at, sizeof list - at, "%s%s", (at > 0u) ? ", " : "", QUANTITY_NAMES[q]);
     }
-    return evh_fail(err, "%s: line %" PRIu64 ": %s; needed columns that are not there: %s", rows->lines.path,
-                    rows->lines.line, from_header ? "the header names the columns" : "no header names the columns",
-                    list);
+    if (!from_header) {
+        return evh_fail(err, "%s: line %" PRIu64 ": no header names the columns; the first line must be one, with %s",
+                        rows->lines.path, rows->lines.line, list);
+    }
+    return evh_fail(err, "%s: line %" PRIu64 ": the header lacks columns that are needed: %s", rows->lines.path,
+                    rows->lines.line, list);
 }
 
 /* What the first line that is no comment says: a header without '#', or data of the caller's layout. */

@@ -194,6 +194,33 @@ def test_replay():
     expect("clocks that do not meet", ["replay", recording("apart", imu_txt=imu(t0=500)), "-o", "out/apart"], 0, "have no orientation", n_lines=1)
 
 
+def test_terminal():
+    """Progress shows on a terminal, and cleans up behind itself."""
+    try:
+        import pty
+    except ImportError:
+        return
+    write("long/events.txt", events(400000, step=0.000001))
+    write("long/calib.txt", CALIB)
+    master, slave = pty.openpty()
+    done = subprocess.Popen([EVSTAB, "replay", "long", "-o", "out/long", "--write", "events"], cwd=ROOT, stdout=subprocess.DEVNULL, stderr=slave)
+    os.close(slave)
+    text = b""
+    while True:
+        try:
+            block = os.read(master, 4096)
+        except OSError:
+            break
+        if not block:
+            break
+        text += block
+    os.close(master)
+    check("replay on a terminal", done.wait() == 0)
+    shown = text.count(b"events/s")
+    check("progress", shown == 0 or text.endswith(b"\r\x1b[K"), text[-100:])
+    print(f"progress was shown {shown} times")
+
+
 def test_bad_input():
     good = events()
     calib = write("calib.txt", CALIB)
@@ -217,7 +244,8 @@ def test_bad_input():
     replay("only blank lines", "\n\n\n", 1, "holds no event")
     replay("binary garbage", bytes(i * 7919 % 256 for i in range(200000)), 1, "is this the right file|no usable event")
     replay("zeros", bytes(100000), 1, "no usable event")
-    replay("another kind of file", imu(5000), 1, "is this the right file")
+    replay("another kind of file", imu(5000), 1, "looks like IMU samples")
+    replay("another kind of text", "lorem ipsum dolor\n" * 5000, 1, "is this the right file")
     replay("png", b"\x89PNG\r\n\x1a\n" + bytes(500), 1, "no usable event")
 
     def skipped(case, line, cause, key):
@@ -307,6 +335,7 @@ def test_attitude():
     check("a turn of 0.5 rad/s about the vertical", abs(yaw - 0.5 * 4.99) < 0.01, yaw)
     expect("gzip", ["attitude", write("imu.csv.gz", gzip.compress((header + "\n".join(rows)).encode())), "-o", "q2.csv"], 0)
     check("reads the same", (ROOT / "q.csv").read_bytes() == (ROOT / "q2.csv").read_bytes())
+    check("quiet", run("attitude", "imu.csv", "-o", "q2.csv", "-q").stdout == "")
     for mode in ("gyro", "valenti"):
         expect(mode, ["attitude", "imu.csv", "-o", "q3.csv", "--mode", mode], 0, n_lines=0)
     expect("wrong mode", ["attitude", "imu.csv", "-o", "q3.csv", "--mode", "kalman"], 2, "expected filter, gyro or valenti", n_lines=1)
@@ -378,7 +407,7 @@ def test_info():
 
 def main():
     try:
-        for test in (test_usage, test_replay, test_bad_input, test_attitude, test_lut, test_info):
+        for test in (test_usage, test_replay, test_terminal, test_bad_input, test_attitude, test_lut, test_info):
             test()
     finally:
         shutil.rmtree(ROOT, ignore_errors=True)
