@@ -19,12 +19,11 @@
 #define N_BISECT   40
 #define N_RADIAL   128 /* Newton needs about 5; every second step at least halves bracket or step: 2 * 38 bits. */
 #define N_NEWTON   20  /* Needs about 3. */
-/* In LSB. Where the lens is steep the step settles first, where it is flat the residual does; next to the fold neither
- * may, because rounding is magnified there. */
-#define CONVERGED 2   /* residual: rounding noise */
-#define SETTLED   16  /* step: no better answer exists */
-#define ACCEPTED  256 /* residual that is still an answer, 6e-8, when neither settles */
-#define STUCK     16  /* movement along the edge of the domain */
+/* In LSB. */
+#define SETTLED        (1 << 8)  /* a Newton step of 2^-24 leaves about its square: it is taken, and is the last */
+#define SETTLED_RADIAL (1 << 18) /* the same, where another iteration follows */
+#define ACCEPTED       256       /* residual, 6e-8, of an answer next to the fold, where rounding keeps steps longer */
+#define STUCK          16        /* movement along the edge of the domain */
 
 typedef struct {
     int64_t x; /* Normalised image coordinates, 32 fractional bits. */
@@ -56,8 +55,9 @@ static int64_t slope_of(const int64_t c[4], int64_t t2) /* g'(t) */
 }
 
 /* t in [0, domain] with g(t) = d, or the end of the domain when d lies beyond it. Newton inside a shrinking bracket: a
- * step that leaves it, or is not half as long as the one before, gives way to bisection, so that nothing can cycle. */
-static int64_t radial_inverse(const evs_camera_t *cam, int64_t d)
+ * step that leaves it, or is not half as long as the one before, gives way to bisection, so that nothing can cycle. The
+ * last step is at most `settled`; when it is Newton's, what it leaves is of the order of its square. */
+static int64_t radial_inverse(const evs_camera_t *cam, int64_t d, int64_t settled)
 {
     int64_t lo = 0;
     int64_t hi = cam->domain_q32;
@@ -73,10 +73,11 @@ static int64_t radial_inverse(const evs_camera_t *cam, int64_t d)
             lo = t;
         }
         int64_t next = t - evs_wide_div_q32(excess, slope_of(cam->poly_q32, t2));
-        if ((next < lo) || (next > hi) || (abs64(next - t) > last / 2)) { next = lo + (hi - lo) / 2; }
+        const bool bisect = (next < lo) || (next > hi) || (abs64(next - t) > last / 2);
+        if (bisect) { next = lo + (hi - lo) / 2; }
         last = abs64(next - t);
         t = next;
-        if (last <= 1) { break; }
+        if ((last <= 1) || (!bisect && (last <= settled))) { break; }
     }
     return t;
 }
@@ -207,32 +208,27 @@ static evs_status_t to_pixel(const evs_camera_t *cam, vec2_t v, evs_camera_px_t 
 
 /* ---- Pinhole: Brown-Conrady ---- */
 
-static vec2_t brown(const evs_camera_t *cam, vec2_t v)
-{
-    const int64_t p1 = cam->cfg.dist_q32[2];
-    const int64_t p2 = cam->cfg.dist_q32[3];
-    const int64_t r2 = mul(v.x, v.x) + mul(v.y, v.y);
-    const int64_t gain = gain_of(cam->poly_q32, r2);
-    const int64_t along_p = 2 * (mul(p2, v.x) + mul(p1, v.y));
-    const vec2_t d = {mul(v.x, gain + along_p) + mul(p2, r2), mul(v.y, gain + along_p) + mul(p1, r2)};
-    return d;
-}
+static int64_t norm2(vec2_t v) { return mul(v.x, v.x) + mul(v.y, v.y); }
 
-static jacobian_t brown_jacobian(const evs_camera_t *cam, vec2_t v)
+/* The distorted position and, unless j is NULL, its derivative. */
+static vec2_t brown(const evs_camera_t *cam, vec2_t v, jacobian_t *j)
 {
     const int64_t *const c = cam->poly_q32;
     const int64_t p1 = cam->cfg.dist_q32[2];
     const int64_t p2 = cam->cfg.dist_q32[3];
-    const int64_t r2 = mul(v.x, v.x) + mul(v.y, v.y);
-    const int64_t bend = 2 * (c[0] + mul(r2, 2 * c[1] + mul(r2, 3 * c[2]))); /* twice d gain / d r2 */
-    const int64_t along_p = 2 * (mul(p2, v.x) + mul(p1, v.y));
-    const int64_t gain = gain_of(c, r2) + along_p;
-    const jacobian_t j = {
-        .xx = gain + mul(mul(v.x, v.x), bend) + 4 * mul(p2, v.x),
-        .xy = mul(mul(v.x, v.y), bend) + 2 * (mul(p1, v.x) + mul(p2, v.y)),
-        .yy = gain + mul(mul(v.y, v.y), bend) + 4 * mul(p1, v.y),
-    };
-    return j;
+    const int64_t r2 = norm2(v);
+    const int64_t p2x = mul(p2, v.x);
+    const int64_t p1y = mul(p1, v.y);
+    const int64_t gain = gain_of(c, r2) + 2 * (p2x + p1y);
+    const vec2_t d = {mul(v.x, gain) + mul(p2, r2), mul(v.y, gain) + mul(p1, r2)};
+    if (j != NULL) {
+        const int64_t bend = 2 * (c[0] + mul(r2, 2 * c[1] + mul(r2, 3 * c[2]))); /* twice d gain / d r2 */
+        const int64_t bend_x = mul(v.x, bend);
+        j->xx = gain + mul(v.x, bend_x) + 4 * p2x;
+        j->xy = mul(v.y, bend_x) + 2 * (mul(p1, v.x) + mul(p2, v.y));
+        j->yy = gain + mul(v.y, mul(v.y, bend)) + 4 * p1y;
+    }
+    return d;
 }
 
 static vec2_t newton_step(jacobian_t j, vec2_t error)
@@ -252,31 +248,33 @@ static evs_status_t brown_inverse(const evs_camera_t *cam, vec2_t d, vec2_t *out
     /* Start from the radial part alone; what is left is the tangential part, a few thousandths. */
     vec2_t v = d;
     if (rd > 0) {
-        const int64_t shrink = evs_wide_div_q32(radial_inverse(cam, rd), rd);
+        const int64_t shrink = evs_wide_div_q32(radial_inverse(cam, rd, SETTLED_RADIAL), rd);
         v = (vec2_t){mul(d.x, shrink), mul(d.y, shrink)};
     }
-    bool found = false;
+    const int64_t domain2 = mul(cam->domain_q32, cam->domain_q32);
+    int64_t residual = 0;
     for (int i = 0; i < N_NEWTON; i++) {
-        const vec2_t there = brown(cam, v);
+        jacobian_t j;
+        const vec2_t there = brown(cam, v, &j);
         const vec2_t error = {d.x - there.x, d.y - there.y};
-        const int64_t residual = abs64(error.x) + abs64(error.y);
-        const vec2_t step = newton_step(brown_jacobian(cam, v), error);
-        found = (residual <= ACCEPTED);
-        if ((residual <= CONVERGED) || (abs64(step.x) + abs64(step.y) <= SETTLED)) {
-            found = true;
-            break;
-        }
+        const vec2_t step = newton_step(j, error);
         vec2_t next = {v.x + step.x, v.y + step.y};
-        const int64_t r = evs_wide_hypot(next.x, next.y);
-        if (r > cam->domain_q32) { /* stay where the model can be trusted */
-            const int64_t back = evs_wide_div_q32(cam->domain_q32, r);
+        residual = abs64(error.x) + abs64(error.y);
+        if (norm2(next) <= domain2) {
+            v = next;
+            if (abs64(step.x) + abs64(step.y) <= SETTLED) {
+                *out = v;
+                return EVS_OK;
+            }
+        } else { /* stay where the model can be trusted */
+            const int64_t back = evs_wide_div_q32(cam->domain_q32, evs_wide_hypot(next.x, next.y));
             next = (vec2_t){mul(next.x, back), mul(next.y, back)};
             const bool stuck = (abs64(next.x - v.x) + abs64(next.y - v.y) <= STUCK);
-            if (stuck && !found) { break; } /* pressed against the edge: no preimage */
+            v = next;
+            if (stuck) { break; } /* pressed against the edge: no preimage, or one on the edge itself */
         }
-        v = next;
     }
-    if (!found || (evs_wide_hypot(v.x, v.y) > cam->domain_q32)) { return EVS_ERR_NUMERIC; }
+    if (residual > ACCEPTED) { return EVS_ERR_NUMERIC; }
     *out = v;
     return EVS_OK;
 }
@@ -296,7 +294,7 @@ static vec2_t fisheye(const evs_camera_t *cam, vec2_t v, int64_t r, int64_t angl
 static evs_status_t fisheye_inverse(const evs_camera_t *cam, int64_t rd, int64_t *angle)
 {
     if (rd > cam->domain_d_q32) { return EVS_ERR_NUMERIC; }
-    *angle = radial_inverse(cam, rd);
+    *angle = radial_inverse(cam, rd, 1);
     return EVS_OK;
 }
 
@@ -306,7 +304,7 @@ static evs_status_t distort(const evs_camera_t *cam, vec2_t v, evs_camera_px_t *
 {
     const int64_t r = evs_wide_hypot(v.x, v.y);
     if (cam->cfg.model == EVS_CAMERA_PINHOLE) {
-        return (r <= cam->domain_q32) ? to_pixel(cam, brown(cam, v), out) : EVS_ERR_NUMERIC;
+        return (r <= cam->domain_q32) ? to_pixel(cam, brown(cam, v, NULL), out) : EVS_ERR_NUMERIC;
     }
     const int64_t angle = evs_wide_angle_q32(r, ONE);
     return (angle <= cam->domain_q32) ? to_pixel(cam, fisheye(cam, v, r, angle), out) : EVS_ERR_NUMERIC;
