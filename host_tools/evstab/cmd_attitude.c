@@ -9,6 +9,7 @@
 #include "command.h"
 #include "csv_writer.h"
 #include "evs/attitude.h"
+#include "faults.h"
 #include "imu_feed.h"
 #include "options.h"
 #include "progress.h"
@@ -59,20 +60,6 @@ static void put_row(evh_csv_t *out, int64_t t_us, evs_quat_t q)
     evh_csv_advance(out, p);
 }
 
-static void report_faults(evs_attitude_faults_t f)
-{
-    char text[256];
-    const int n =
-        snprintf(text, sizeof text,
-                 "gyro clipped %" PRIu32 ", spikes %" PRIu32 ", gaps %" PRIu32 "; accelerations left out %" PRIu32
-                 ", fields left out %" PRIu32 ", times left out %" PRIu32,
-                 f.n_gyro_saturated, f.n_gyro_spikes, f.n_gyro_gaps, f.n_accel_bad, f.n_mag_bad, f.n_time_bad);
-    if ((n > 0) &&
-        ((f.n_gyro_saturated | f.n_gyro_spikes | f.n_gyro_gaps | f.n_accel_bad | f.n_mag_bad | f.n_time_bad) != 0u)) {
-        evh_note("the filter saw: %s", text);
-    }
-}
-
 static bool run(evh_imu_t *imu, evs_attitude_t *att, evh_csv_t *out, uint64_t *n_rows, evh_error_t *err)
 {
     evt_imu_feed_t feed = {att, feed_gyro, feed_accel, feed_mag, false};
@@ -107,6 +94,10 @@ static bool attitude(const char *in_path, const char *out_path, evs_attitude_mod
         evh_imu_close(&imu);
         return evh_fail(err, "%s: holds no sample", in_path);
     }
+    if (evh_same_file(in_path, out_path)) {
+        evh_imu_close(&imu);
+        return evh_fail(err, "%s: the output would overwrite the input", out_path);
+    }
     if (!evh_csv_open_path(&out, out_path, "t_s,qw,qx,qy,qz", err)) {
         evh_imu_close(&imu);
         return false;
@@ -116,7 +107,8 @@ static bool attitude(const char *in_path, const char *out_path, evs_attitude_mod
     evh_tally_report(&imu.rows.tally, evh_path_name(in_path));
     if (ok && (imu.rows.tally.n_good == 0u)) { ok = evh_fail(err, "%s: holds no usable sample", in_path); }
     if (ok) {
-        report_faults(evs_attitude_faults(&att));
+        const evs_attitude_faults_t faults = evs_attitude_faults(&att);
+        evt_note_attitude_faults(&faults);
         if (!evh_is_quiet()) {
             (void)printf("%s: %" PRIu64 " rows, %" PRIu64 " of them repeat the last orientation\n", out_path, n_rows,
                          evh_tally_skipped(&imu.rows.tally));

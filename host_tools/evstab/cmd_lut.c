@@ -219,7 +219,9 @@ int evt_lut_main(int argc, char **argv)
     }
 
     make_name((opt_name != NULL) ? opt_name : opt_out, name);
-    if (read_calib(words[0], &calib, &err)) {
+    if (evh_same_file(words[0], opt_out)) {
+        (void)evh_fail(&err, "%s: the output would overwrite the input", opt_out);
+    } else if (read_calib(words[0], &calib, &err)) {
         if (opt_size != NULL) {
             calib.width_px = width_px;
             calib.height_px = height_px;

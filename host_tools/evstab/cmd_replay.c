@@ -7,6 +7,7 @@
 
 #include "command.h"
 #include "decimal.h"
+#include "faults.h"
 #include "options.h"
 #include "replay.h"
 
@@ -94,6 +95,7 @@ static void report(const evt_replay_t *r, const evt_replay_result_t *x)
     if (r->rec.imu != NULL) { evh_tally_report(&x->imu_tally, evh_path_name(r->rec.imu)); }
     if (r->rec.poses != NULL) { evh_tally_report(&x->poses_tally, evh_path_name(r->rec.poses)); }
     report_unoriented(x);
+    evt_note_attitude_faults(&x->attitude_faults);
     if (x->n_no_undistorted + x->n_out_of_range > 0u) {
         evh_note("%" PRIu64 " of %" PRIu64 " events have no position: %" PRIu64 " under the lens model, %" PRIu64
                  " rotated out of range",

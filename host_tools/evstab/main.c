@@ -30,6 +30,14 @@ static void print_help(FILE *out)
                   "\n'evstab COMMAND --help' tells more about one of them; 'evstab --version' prints the version.\n");
 }
 
+/* What was printed must have arrived: on a full disk, say, it has not. */
+static int finish(int status)
+{
+    if ((fflush(stdout) == 0) && (ferror(stdout) == 0)) { return status; }
+    (void)fprintf(stderr, "evstab: cannot write to the standard output\n");
+    return (status != EVT_EXIT_OK) ? status : EVT_EXIT_FAILED;
+}
+
 int main(int argc, char **argv)
 {
     if (argc < 2) {
@@ -38,14 +46,14 @@ int main(int argc, char **argv)
     }
     if ((strcmp(argv[1], "--help") == 0) || (strcmp(argv[1], "-h") == 0) || (strcmp(argv[1], "help") == 0)) {
         print_help(stdout);
-        return EVT_EXIT_OK;
+        return finish(EVT_EXIT_OK);
     }
     if (strcmp(argv[1], "--version") == 0) {
         (void)printf("evstab %s\n", EVS_VERSION_STRING);
-        return EVT_EXIT_OK;
+        return finish(EVT_EXIT_OK);
     }
     for (size_t i = 0; i < sizeof COMMANDS / sizeof COMMANDS[0]; i++) {
-        if (strcmp(argv[1], COMMANDS[i].name) == 0) { return COMMANDS[i].run(argc - 1, argv + 1); }
+        if (strcmp(argv[1], COMMANDS[i].name) == 0) { return finish(COMMANDS[i].run(argc - 1, argv + 1)); }
     }
     (void)fprintf(stderr, "evstab: unknown command '%s'; 'evstab --help' lists them\n", argv[1]);
     return EVT_EXIT_USAGE;

@@ -8,6 +8,7 @@
 #include "decimal.h"
 #include "detect.h"
 #include "evs/float.h"
+#include "lines.h"
 #include "options.h"
 #include "replay.h"
 #include "to_device.h"
@@ -281,6 +282,7 @@ static bool check_input_kind(const evt_replay_t *r, evh_error_t *err)
                                        [EVH_KIND_CONFIG] = "a YAML file",
                                        [EVH_KIND_IMAGES] = "a list of images"};
     evh_kind_t kind = EVH_KIND_UNKNOWN;
+    if (!evh_file_is_regular(r->rec.events)) { return true; } /* A pipe can be read only once. */
     if (!evh_detect(r->rec.events, &kind, err)) { return false; }
     if (((size_t)kind < sizeof WHAT / sizeof WHAT[0]) && (WHAT[kind] != NULL)) {
         return evh_fail(err, "%s: looks like %s; expected events, \"t x y p\" lines, or a folder", r->rec.events,

@@ -147,7 +147,8 @@ bool evh_imu_open(evh_imu_t *imu, const char *path, const evh_imu_order_t *order
     const evh_layout_t *layout = (kind == EVH_IMU_ORDER_COLUMNS)      ? &order->columns
                                  : (kind == EVH_IMU_ORDER_GYRO_FIRST) ? &GYRO_FIRST
                                                                       : &ACCEL_FIRST;
-    layout = judge_layout(path, layout, kind == EVH_IMU_ORDER_AUTO, err);
+    /* A pipe can be read only once. */
+    if (evh_file_is_regular(path)) { layout = judge_layout(path, layout, kind == EVH_IMU_ORDER_AUTO, err); }
     return (err->text[0] == '\0') && open_rows(imu, path, layout, err);
 }
 

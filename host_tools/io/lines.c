@@ -17,6 +17,12 @@ bool evh_file_exists(const char *path)
     return (stat(path, &st) == 0) && !S_ISDIR(st.st_mode);
 }
 
+bool evh_file_is_regular(const char *path)
+{
+    struct stat st;
+    return (stat(path, &st) == 0) && S_ISREG(st.st_mode);
+}
+
 bool evh_lines_open(evh_lines_t *lines, const char *path, evh_error_t *err)
 {
     struct stat st;

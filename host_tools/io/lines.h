@@ -56,6 +56,9 @@ double evh_lines_fraction(const evh_lines_t *lines);
 
 void evh_lines_close(evh_lines_t *lines);
 
+/** True when @p path may be opened twice: a file, not a pipe. */
+bool evh_file_is_regular(const char *path);
+
 /** True when @p path names something that exists and is no directory. */
 bool evh_file_exists(const char *path);
 

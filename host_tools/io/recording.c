@@ -35,6 +35,14 @@ bool evh_is_folder(const char *path)
     return (stat(path, &st) == 0) && S_ISDIR(st.st_mode);
 }
 
+bool evh_same_file(const char *a, const char *b)
+{
+    struct stat first;
+    struct stat second;
+    return (stat(a, &first) == 0) && (stat(b, &second) == 0) && (first.st_dev == second.st_dev) &&
+           (first.st_ino == second.st_ino);
+}
+
 /* DIR/NAME or DIR/NAME.gz, whichever exists; NULL for none. */
 static char *find_file(const char *dir, const char *name)
 {

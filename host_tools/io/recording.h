@@ -36,6 +36,9 @@ char *evh_path_join(const char *dir, const char *name);
 /** What follows the last '/', for messages. */
 const char *evh_path_name(const char *path);
 
+/** Whether two paths name one existing file. */
+bool evh_same_file(const char *a, const char *b);
+
 bool evh_is_folder(const char *path);
 
 /** Create the folder and its parents. */

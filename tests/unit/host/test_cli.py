@@ -186,6 +186,19 @@ def test_replay():
     expect("gzip", ["replay", "gz", "-o", "out/gz", "--write", "events", "-q"], 0)
     check("reads the same", (ROOT / "out/gz/events.csv").read_bytes() == (ROOT / "out/a/b/events.csv").read_bytes())
 
+    recording("late", imu_txt=imu(t0=0.905))
+    expect("IMU clock 5 ms late", ["replay", "late", "-o", "out/late", "--imu-offset-us", "-5000", "--write", "events", "-q"], 0)
+    for name in ("events.csv", "windows.csv", "attitude.csv"):
+        check(f"offset undoes it: {name}", (ROOT / "out/late" / name).read_bytes() == (ROOT / "out/a/b" / name).read_bytes())
+    expect("filter faults are told", ["replay", recording("hard", imu_txt=imu().replace("-9.7", "-777", 1)), "-o", "out/hard"], 0,
+           "the attitude filter counts 1 accelerations left out")
+
+    if os.path.exists("/bin/bash"):
+        done = subprocess.run(["/bin/bash", "-c", f"{EVSTAB} replay <(cat good/events.txt) --calib good/calib.txt --imu <(cat good/imu.txt) "
+                               "-o out/pipe --write events -q"], cwd=ROOT, capture_output=True, text=True)
+        check("pipes", done.returncode == 0 and (ROOT / "out/pipe/events.csv").read_bytes() == (ROOT / "out/a/b/events.csv").read_bytes(),
+              done.stderr)
+
     epoch = 1403715273
     recording("epoch", events_txt=events(t0=epoch), imu_txt=imu(t0=epoch - 0.1), groundtruth_txt=None)
     expect("times since 1970", ["replay", "epoch", "-o", "out/epoch", "--write", "events", "-q"], 0)
@@ -360,6 +373,7 @@ def test_attitude():
     expect("empty", ["attitude", write("empty.csv", ""), "-o", "q.csv"], 1, "holds no sample", n_lines=1)
     expect("header alone", ["attitude", write("head.csv", header), "-o", "q.csv"], 1, "holds no sample", n_lines=1)
     expect("missing", ["attitude", "no.csv", "-o", "q.csv"], 1, "no.csv: No such file", n_lines=1)
+    expect("output is the input", ["attitude", "imu.csv", "-o", "./imu.csv"], 1, "would overwrite the input", n_lines=1)
     expect("no output", ["attitude", "imu.csv"], 2, "-o Q.csv is missing", n_lines=1)
     expect("unwritable", ["attitude", "imu.csv", "-o", "/nowhere/q.csv"], 1, "/nowhere/q.csv: cannot write", n_lines=1)
     if os.path.exists("/dev/full"):
@@ -380,6 +394,11 @@ def test_lut():
         check("the header compiles", done.returncode == 0, done.stderr)
     expect("odd step", ["lut", "calib.txt", "-o", "x.h", "--step", "3"], 2, "expected 1, 2, 4", n_lines=1)
     expect("odd name", ["lut", "calib.txt", "-o", "x.h", "--name", "a b"], 2, "expected a short C name", n_lines=1)
+    expect("output is the input", ["lut", "calib.txt", "-o", "calib.txt"], 1, "would overwrite the input", n_lines=1)
+    if os.path.exists("/dev/full"):
+        with open("/dev/full", "wb") as full:
+            done = subprocess.run([EVSTAB, "--help"], stdout=full, stderr=subprocess.PIPE)
+        check("standard output full", done.returncode == 1 and b"standard output" in done.stderr, done)
     expect("no camera", ["lut", write("none.yaml", "a: 1\n"), "-o", "x.h"], 1, "no camera in it", n_lines=1)
     expect("folds over", ["lut", write("fold.txt", "200 200 120 90 -8000 0 0 0 0\n"), "-o", "x.h"], 1, "check the distortion coefficients", n_lines=1)
     expect("unwritable", ["lut", "calib.txt", "-o", "/nowhere/x.h"], 1, "cannot write", n_lines=1)
