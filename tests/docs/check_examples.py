@@ -5,8 +5,8 @@
 
 usage: check_examples.py --work DIR --include DIR PAGE... -- COMPILER [FLAG...]
 
-An example is a fenced block that opens with ```c example. It must compile by itself, as C99, without a warning: a reader
-pastes it. Blocks that open with ```c alone are fragments and stay unread. A run that finds no example at all fails.
+An example is a fenced block that opens with ```c. It must compile by itself, as C99, without a warning: a reader pastes it.
+Blocks that open with ```c fragment stay unread. A run that finds no example at all fails.
 """
 import argparse
 import os
@@ -15,7 +15,7 @@ import subprocess
 import sys
 
 STRICT = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wsign-conversion", "-Wshadow", "-Werror"]
-EXAMPLE = re.compile(r"^```c example[^\n]*\n(.*?)^```$", re.M | re.S)
+EXAMPLE = re.compile(r"^```c\n(.*?)^```$", re.M | re.S)
 
 
 def main():

@@ -109,5 +109,6 @@ add_custom_target(
   COMMAND ${CMAKE_CTEST_COMMAND} --output-on-failure -R "^target[.](m|rv)[a-z0-9]+[.]build$"
   COMMAND ${memory_table} --write ${PROJECT_SOURCE_DIR}/docs/memory.md
   ${update_performance}
+  COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/tests/support/cost_table.py --write
   WORKING_DIRECTORY ${PROJECT_BINARY_DIR}
   USES_TERMINAL VERBATIM)
