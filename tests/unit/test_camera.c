@@ -186,6 +186,19 @@ static void test_lens_without_distortion_gives_each_pixel_back_exactly(void)
     }
 }
 
+static void test_pinhole_domain_ends_at_64_or_at_the_farthest_pixel_that_can_be_asked_for(void)
+{
+    evs_camera_config_t cfg = evs_camera_config_ideal(240, 180, EVS_CAMERA_FOCAL_MIN_Q16);
+    evs_camera_t cam;
+    TEST_ASSERT_EQUAL_INT(EVS_OK, evs_camera_init(&cam, &cfg));
+    TEST_ASSERT_EQUAL_INT64(64 * ONE_Q32, evs_camera_domain_q32(&cam));
+    cfg = plain();
+    TEST_ASSERT_EQUAL_INT(EVS_OK, evs_camera_init(&cam, &cfg));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6,
+                              sqrt((2048.0 + 119.5) * (2048.0 + 119.5) + (2048.0 + 89.5) * (2048.0 + 89.5)) / 200.0,
+                              (double)evs_camera_domain_q32(&cam) / 4294967296.0);
+}
+
 static void test_ideal_camera_looks_along_the_middle_of_its_sensor(void)
 {
     const evs_camera_config_t cfg = plain();
@@ -387,8 +400,8 @@ static void test_iteration_does_not_cycle_on_a_lens_that_bends_both_ways(void)
     const evs_camera_t *const lenses[] = {&fisheye, &pinhole, &steep};
     for (int k = 0; k < 3; k++) {
         const double domain = fmin((double)evs_camera_domain_q32(lenses[k]) / 4294967296.0, (k == 0) ? 1.4 : 3.5);
-        for (int i = 1; i <= 190; i++) {
-            const double t = domain * i / 200.0;
+        for (int i = 1; i <= 950; i++) {
+            const double t = domain * i / 1000.0;
             const double r = (k == 0) ? tan(t) : t;
             const evs_camera_px_t ideal = px_of(119.5 + 120.0 * r, 89.5 - 160.0 * r);
             evs_camera_px_t there;
@@ -533,6 +546,7 @@ int main(void)
     RUN_TEST(test_null_pointers_are_refused);
     RUN_TEST(test_numbers_that_no_calibration_holds_are_refused_at_the_conversion);
     RUN_TEST(test_lens_without_distortion_gives_each_pixel_back_exactly);
+    RUN_TEST(test_pinhole_domain_ends_at_64_or_at_the_farthest_pixel_that_can_be_asked_for);
     RUN_TEST(test_ideal_camera_looks_along_the_middle_of_its_sensor);
     RUN_TEST(test_undistort_is_within_its_bound_of_the_double_model_for_the_cameras_of_the_paper);
     RUN_TEST(test_rounded_point_agrees_with_the_double_model_except_within_the_bound_of_a_tie);

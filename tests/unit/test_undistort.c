@@ -138,6 +138,8 @@ static void test_tile_tables_name_the_fault_and_touch_nothing(void)
     TEST_ASSERT_EQUAL_INT(EVS_ERR_SIZE, evs_undistort_bind_tiles(&u, &grid, tile_table, N_PX - 1));
     TEST_ASSERT_EQUAL_INT(EVS_ERR_ARG, evs_undistort_bind_tiles(&u, &foreign, tile_table, N_PX));
     TEST_ASSERT_EQUAL_INT(EVS_ERR_ARG, evs_undistort_bind_tiles(&u, &foreign, NULL, 0));
+    TEST_ASSERT_EQUAL_INT(EVS_OK, evs_tile_grid_init(&foreign, W, H + 1, 7, 5));
+    TEST_ASSERT_EQUAL_INT(EVS_ERR_ARG, evs_undistort_bind_tiles(&u, &foreign, NULL, 0));
     TEST_ASSERT_EQUAL_INT(EVS_ERR_NULL, evs_undistort_bind_tiles(NULL, &grid, tile_table, N_PX));
     TEST_ASSERT_EQUAL_INT(EVS_ERR_NULL, evs_undistort_bind_tiles(&u, NULL, tile_table, N_PX));
     TEST_ASSERT_EQUAL_INT(EVS_ERR_NULL, evs_undistort_bind_tiles(&u, &grid, NULL, N_PX));
@@ -265,6 +267,48 @@ static void test_pixels_without_a_preimage_are_outside_at_every_step_and_their_n
     }
 }
 
+static void test_node_off_the_sensor_needs_no_preimage(void)
+{
+    /* Folds over 27.6 px from the centre: behind the corners, at 26.5 px, but before the nodes around them. */
+    const calibration_t c = {"edge", EVS_CAMERA_PINHOLE, 42, 30, {60.0, 60.0, 20.5, 14.5}, {-0.7, 0.0, 0.0, 0.0, 0.0}};
+    cam = camera_of(&c);
+    TEST_ASSERT_TRUE(evs_point_is_outside(exact(48, 0)));
+    build(8);
+    for (uint16_t y = 0; y < 30; y++) {
+        for (uint16_t x = 0; x < 42; x++) {
+            const evs_point_t got = evs_undistort_pixel(&u, x, y);
+            TEST_ASSERT_FALSE(evs_point_is_outside(got));
+            TEST_ASSERT_INT16_WITHIN(3 * 16, exact(x, y).x_q4, got.x_q4);
+            TEST_ASSERT_INT16_WITHIN(3 * 16, exact(x, y).y_q4, got.y_q4);
+        }
+    }
+}
+
+static void test_node_drawn_beyond_2047_px_is_outside_instead_of_wrapping(void)
+{
+    /* The last pixel looks ever closer to 90 degrees: from far inside the range to far outside it. */
+    for (int i = 0; i < 40; i++) {
+        const calibration_t c = {
+            "wide", EVS_CAMERA_FISHEYE, 52, 4, {20.0, 20.0, 51.0 - 20.0 * (1.50 + 0.002 * i), 1.5}, {0, 0, 0, 0, 0}};
+        cam = camera_of(&c);
+        build(32);
+        for (uint16_t x = 32; x < 52; x++) {
+            const evs_point_t got = evs_undistort_pixel(&u, x, 1);
+            TEST_ASSERT_TRUE(evs_point_is_outside(got) || (got.x_q4 >= 16 * x));
+        }
+    }
+}
+
+static void test_interpolation_rounds_half_up_for_both_signs(void)
+{
+    static const evs_point_t nodes[] = {{0, 0}, {1, -1}, {-3, 5}, {0, 32752}};
+    TEST_ASSERT_EQUAL_INT(EVS_OK, evs_undistort_bind(&u, 2, 2, 2, nodes, 4));
+    assert_same_point(nodes[0], evs_undistort_pixel(&u, 0, 0));
+    assert_same_point((evs_point_t){1, 0}, evs_undistort_pixel(&u, 1, 0));    /* 0.5, -0.5 */
+    assert_same_point((evs_point_t){-1, 3}, evs_undistort_pixel(&u, 0, 1));   /* -1.5, 2.5 */
+    assert_same_point((evs_point_t){0, 8189}, evs_undistort_pixel(&u, 1, 1)); /* -0.5, 8189.0 */
+}
+
 /* ---- Batches ---- */
 
 static void test_batch_gives_each_event_the_position_of_its_pixel_whatever_its_polarity(void)
@@ -385,6 +429,9 @@ int main(void)
     RUN_TEST(test_tables_hold_their_error_inside_the_image_for_the_cameras_of_the_paper);
     RUN_TEST(test_grid_covers_the_last_row_and_column_whatever_the_remainder);
     RUN_TEST(test_pixels_without_a_preimage_are_outside_at_every_step_and_their_neighbours_are_not_nonsense);
+    RUN_TEST(test_node_off_the_sensor_needs_no_preimage);
+    RUN_TEST(test_node_drawn_beyond_2047_px_is_outside_instead_of_wrapping);
+    RUN_TEST(test_interpolation_rounds_half_up_for_both_signs);
     RUN_TEST(test_batch_gives_each_event_the_position_of_its_pixel_whatever_its_polarity);
     RUN_TEST(test_event_off_the_sensor_is_outside_and_counted);
     RUN_TEST(test_count_of_rejected_events_saturates);
