@@ -62,7 +62,7 @@ static void put_row(evh_csv_t *out, int64_t t_us, evs_quat_t q)
 
 static bool run(evh_imu_t *imu, evs_attitude_t *att, evh_csv_t *out, uint64_t *n_rows, evh_error_t *err)
 {
-    evt_imu_feed_t feed = {att, feed_gyro, feed_accel, feed_mag, false};
+    evt_imu_feed_t feed = {att, feed_gyro, feed_accel, feed_mag};
     evh_imu_sample_t s;
     evt_progress_t progress;
     int64_t t_us = 0;

@@ -34,7 +34,7 @@ bool evt_orientation_feed_open(evt_orientation_feed_t *feed, const evt_replay_t 
     feed->kind = r->attitude;
     feed->pipeline = pipeline;
     feed->offset_us = r->pipeline.track.offset_us;
-    feed->imu_feed = (evt_imu_feed_t){pipeline, push_gyro, push_accel, push_mag, false};
+    feed->imu_feed = (evt_imu_feed_t){pipeline, push_gyro, push_accel, push_mag};
     if (is_imu(feed)) {
         if (!evh_imu_open(&feed->imu, r->rec.imu, &r->imu_order, err)) { return false; }
         feed->imu_open = true;

@@ -186,6 +186,15 @@ def test_replay():
     expect("gzip", ["replay", "gz", "-o", "out/gz", "--write", "events", "-q"], 0)
     check("reads the same", (ROOT / "out/gz/events.csv").read_bytes() == (ROOT / "out/a/b/events.csv").read_bytes())
 
+    # The device's clock wraps after 2^32 us; a recording across the wrap gives the same but for the times.
+    recording("wrap", events_txt=events(t0=4294.9), imu_txt=imu(t0=4294.8), groundtruth_txt=poses(t0=4294.8))
+    for attitude in ("imu", "truth"):
+        expect("across the wrap of the clock", ["replay", "wrap", "-o", "out/wrap", "--attitude", attitude, "--write", "events", "-q"], 0)
+        expect("without it", ["replay", "good", "-o", "out/nowrap", "--attitude", attitude, "--write", "events", "-q"], 0)
+        rows = [[row.split(",", 1)[1] for row in (ROOT / out / "events.csv").read_text().splitlines()] for out in ("out/wrap", "out/nowrap")]
+        check(f"the same across the wrap: {attitude}", rows[0] == rows[1])
+    check("and its times go on", (ROOT / "out/wrap/events.csv").read_text().splitlines()[-1].startswith("4295.099900,"))
+
     recording("late", imu_txt=imu(t0=0.905))
     expect("IMU clock 5 ms late", ["replay", "late", "-o", "out/late", "--imu-offset-us", "-5000", "--write", "events", "-q"], 0)
     for name in ("events.csv", "windows.csv", "attitude.csv"):
