@@ -122,12 +122,30 @@ static bool usage(bool *usage_fault, evh_error_t *err, const char *option, const
     return evh_fail(err, "%s is '%s'; expected %s", option, text, expected);
 }
 
+/* Whether nothing will be rotated, asked for or for want of anything to rotate by. Only then the lens may be unknown.
+ */
+static bool rotates_nothing(const evt_replay_t *r, const evt_replay_options_t *o)
+{
+    if (o->attitude != NULL) { return strcmp(o->attitude, ATTITUDES[EVT_ATTITUDE_NONE]) == 0; }
+    return (r->rec.imu == NULL) && (r->rec.poses == NULL);
+}
+
+/* The camera of events that are left where they are: no distortion, the axis in the middle. */
+static void assume_no_lens(evh_calib_t *calib)
+{
+    calib->fx_px = calib->width_px;
+    calib->fy_px = calib->width_px;
+    calib->cx_px = (calib->width_px - 1.0) / 2.0;
+    calib->cy_px = (calib->height_px - 1.0) / 2.0;
+}
+
 static bool settle_calib(evt_replay_t *r, const evt_replay_options_t *o, const evh_config_t *config, bool *usage_fault,
                          evh_error_t *err)
 {
     evh_kind_t kind = EVH_KIND_CALIB;
     uint16_t width_px = 0u;
     uint16_t height_px = 0u;
+    bool no_lens = false;
     if ((o->size != NULL) && !evt_parse_size(o->size, &width_px, &height_px)) {
         return usage(usage_fault, err, "--size", o->size, "WIDTHxHEIGHT, such as 240x180, up to 2048x2048");
     }
@@ -148,10 +166,16 @@ static bool settle_calib(evt_replay_t *r, const evt_replay_options_t *o, const e
     } else if (config->has_calib) {
         r->calib = config->calib;
         r->calib_path = (o->config != NULL) ? o->config : r->rec.config;
+    } else if (rotates_nothing(r, o)) {
+        no_lens = true;
+        r->calib.width_px = config->calib.width_px;
+        r->calib.height_px = config->calib.height_px;
+        evh_note("no calibration: events are cut into windows, but neither undistorted nor rotated");
     } else {
         return evh_fail(
             err,
-            "%s: no calibration; give --calib FILE (fx fy cx cy k1 k2 p1 p2 k3) or --config FILE.yaml with K and D",
+            "%s: no calibration; give --calib FILE (fx fy cx cy k1 k2 p1 p2 k3), --config FILE.yaml with K and D, "
+            "or --attitude none",
             o->input);
     }
     if (o->size != NULL) {
@@ -163,6 +187,7 @@ static bool settle_calib(evt_replay_t *r, const evt_replay_options_t *o, const e
         evh_note("no file says the sensor size: %ux%u is taken; --size says otherwise", DEFAULT_WIDTH_PX,
                  DEFAULT_HEIGHT_PX);
     }
+    if (no_lens) { assume_no_lens(&r->calib); }
     return true;
 }
 

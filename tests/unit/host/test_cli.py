@@ -254,7 +254,9 @@ def test_bad_input():
                       n_lines=n_lines), f"out/bad/{name}"
 
     expect("missing file", ["replay", "nowhere.txt", "-o", "o"], 1, "nowhere.txt: No such file", n_lines=1)
-    expect("missing calibration", ["replay", write("bad/alone.txt", good), "-o", "o"], 1, "no calibration; give --calib", n_lines=1)
+    expect("events alone", ["replay", write("bad/alone.txt", good), "-o", "o"], 0, "neither undistorted nor rotated", n_lines=0)
+    expect("missing calibration", ["replay", "bad/alone.txt", "--poses", write("bad/one_pose.txt", "0 0 0 0 0 0 0 1\n"), "-o", "o"], 1,
+           "no calibration; give --calib", n_lines=1)
     (ROOT / "empty_folder").mkdir()
     expect("empty folder", ["replay", "empty_folder", "-o", "o"], 1, "no events in this folder", n_lines=1)
     expect("folder for a file", ["replay", "bad/alone.txt", "--calib", "empty_folder", "-o", "o"], 1, "is a folder", n_lines=1)
