@@ -6,6 +6,7 @@
 set(EVS_INCLUDE_DIR ${CMAKE_CURRENT_LIST_DIR}/include)
 set(EVS_SOURCES
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_attitude.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_attitude_valenti.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_camera.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_clock.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_fixed.c

@@ -1,68 +1,57 @@
 /* SPDX-License-Identifier: MIT
  * SPDX-FileCopyrightText: 2026 the evstab authors */
-#include "evs/attitude.h"
+#include "evs_attitude_private.h"
 
-#define STEP_MAX_US     20000u  /* Longest single integration step: 128 rad/s turn 2.56 rad in it, half of it in Q30. */
-#define TRIM_STEP_US    100000u /* Longest step of the corrections: a slower sensor is treated as if at this rate. */
-#define REST_TAU_US     350000  /* Running means of the rest detector. */
+/* --- constants ------------------------------------------------------------------------------------------------- */
+
+#define TRIM_STEP_US    100000u   /* Longest step of a correction: a slower sensor is treated as if at this rate. */
+#define STALE_US        500000    /* A correction older than this is not applied any more. */
 #define RELEARN_US      60000000u /* Stillness after which even a bias far from the old one is believed. */
-#define FIELD_SETTLE_US 500000u   /* An undisturbed field must last so long before it is believed again, */
-#define FIELD_REJECT_US 60000000u /* a disturbed one is ignored for no longer than this, */
-#define FIELD_NEW_US    20000000u /* and becomes the new normal after so long in motion. */
+#define FIELD_FIRST_US  3000000u  /* The undisturbed field is the first one that lasts so long; */
+#define FIELD_SETTLE_US 500000u   /* it must be back for so long before it is believed again; */
+#define FIELD_REJECT_US 60000000u /* another is ignored for no longer than this */
+#define FIELD_NEW_US    20000000u /* and becomes the undisturbed one after so long in motion. */
 #define RUN_OF_EQUALS   3u        /* As many equal samples at the largest rate seen are a clipped gyro. */
 #define TIME_BACK_MAX   8u        /* As many samples of a time that runs back are a restarted clock. */
 
-/* Private flags share the word with the public ones. */
-#define SEEN_GYRO      (1u << 12)
-#define SEEN_ACCEL     (1u << 13)
-#define SEEN_MAG       (1u << 14)
-#define ACCEL_STEADY   (1u << 15)
-#define VALENTI_STEADY (1u << 11)
-#define PUBLIC_FLAGS   0x03FFu
-
+#define RATE_MAX_Q24    INT32_C(2130706432) /* 127 rad/s: room for the bias */
 #define INV_6_Q32       INT32_C(715827883)
 #define INV_24_Q32      INT32_C(178956971)
 #define INV_120_Q32     INT32_C(35791394)
 #define INV_720_Q32     INT32_C(5965232)
-#define INV_5040_Q32    INT32_C(852176)
-#define GRAVITY_Q24     INT32_C(164528285) /* 9.80665 m/s^2 */
-#define SQRT2_Q30       INT32_C(1518500250)
-#define MOTION_MIN_Q24  INT32_C(5856276)    /* 20 deg/s: a new field is only judged while the carrier turns. */
-#define SPIKE_Q8        INT32_C(2560)       /* 10 rad/s from one sample to the next, and back with the one after. */
-#define CLIP_MIN_Q24    INT32_C(72142029)   /* 4.3 rad/s: no gyro has a smaller full scale. */
-#define GRAVITY_MIN_Q24 INT32_C(16777216)   /* 1 m/s^2: below it the mean of the acceleration has no direction. */
-#define ACCEL_DRIFT_Q7  6                   /* 0.05 m/s^2: how far gravity may wander in the IMU while it rests. */
-#define GAIN_MAX_Q24    INT32_C(2130706432) /* 127 1/s */
-#define BIAS_GAIN_0_Q24 INT32_C(50331648)   /* 3 1/s: the first rest replaces the bias, */
-#define BIAS_GAIN_Q24   INT32_C(4194304)    /* 0.25 1/s: later ones refine it. */
-#define BIAS_STEP_Q31   INT32_C(4294967)    /* 2 mrad/s: a rate further off what was learnt is a slow turn, */
-#define BIAS_DRIFT_Q20  UINT32_C(78812)     /* with 35 urad/s^2 of drift allowed in between (Q31 per us, Q20). */
+#define NORM_DONE_Q32   UINT32_C(65536)        /* 1.5e-5: the step of Newton that follows it leaves 3e-10 */
+#define SMALL_TURN      UINT32_C(1124)         /* 2^32 rad us in Q24: 0.288 rad, and 1/4 rad of half the rotation */
+#define BIAS_LIMIT_Q24  UINT32_C(8388608)      /* 0.5 rad/s: no bias is larger */
+#define CLIP_MIN_Q24    UINT32_C(72142029)     /* 4.3 rad/s: no gyro has a smaller full scale */
+#define SPIKE_Q23       UINT32_C(83886080)     /* 10 rad/s from one sample to the next */
+#define MOTION_MIN_Q24  UINT32_C(5856276)      /* 20 deg/s: a new field is only judged while the carrier turns */
+#define SHOCK_Q20       UINT32_C(62914560)     /* 60 m/s^2 in a single sample */
+#define ACCEL_DRIFT_Q7  UINT32_C(6)            /* 0.05 m/s^2: how far gravity may wander in the IMU while it rests */
+#define GRAVITY_Q24     INT32_C(164528285)     /* 9.80665 m/s^2 */
+#define GRAVITY_MIN_Q24 INT32_C(33554432)      /* 2 m/s^2: below it the mean acceleration has no direction */
+#define FIELD_MAX_Q16   (UINT32_C(4096) << 16) /* uT; keeps the rotation within 32 bits */
+#define GAIN_MAX_Q24    INT32_C(2130706432)    /* 127 1/s */
+#define CORRECT_MAX_Q24 INT32_C(268435456)     /* 16 rad/s: 0.16 rad of half a rotation in the longest step */
+#define FIRST_MAG_Q24   INT32_C(134217728)     /* 8 1/s: how quickly the heading follows at first */
+#define REST_GAIN_Q32   12271u                 /* per us: running means of the rest detector, 0.35 s */
+#define BIAS_REST_Q31   537u                   /* per us: at rest the bias follows with 4 s */
+#define BIAS_MOTION_Q31 43u                    /* per us: 0.02 of the correction is put down to bias before any rest */
+#define BIAS_STEP_Q31   INT32_C(4294967)       /* 2 mrad/s: a rate further off the bias is a slow turn; */
+#define BIAS_DRIFT_Q20  78812u                 /* per us: 35 urad/s^2 of drift are allowed in between */
+#define MAG_GAIN_Q32    21475u                 /* per us: mean of the field, 0.2 s */
+#define FIELD_GAIN_Q32  215u                   /* per us: the undisturbed field, 20 s */
 
-/* ---- time ---- */
-
-/* Seconds in Q32 from microseconds up to 1 s: 2^32 / 10^6 = 4294 + 63380 / 2^16. */
-static int64_t seconds_q32(uint32_t dt_us) { return (int64_t)dt_us * 4294 + (((int64_t)dt_us * 63380) >> 16); }
-
-/* rate (1/s, Q24) times dt in Q31, at most one half: a correction never overshoots. */
-static int32_t gain_q31(int32_t rate_q24, uint32_t dt_us)
-{
-    const int64_t gain = ((int64_t)rate_q24 * seconds_q32(dt_us)) >> 25;
-    return (gain > (INT64_C(1) << 30)) ? (INT32_C(1) << 30) : (int32_t)gain;
-}
-
-/* 1000 / ms in Q24; a 32-bit division, so only where things change. */
-static int32_t per_second_q24(uint32_t tau_ms) { return (int32_t)((UINT32_C(16777216) * 125u) / tau_ms * 8u); }
-static int32_t corner_q24(uint32_t tau_ms) { return evs_q_mul(per_second_q24(tau_ms), SQRT2_Q30, 30); }
+/* --- time ------------------------------------------------------------------------------------------------------ */
 
 /* Time since the last sample of this sensor; 0 for the first one and for one that has to be left out. */
 static uint32_t advance(evs_attitude_t *att, uint32_t *last_us, uint8_t *n_back, uint32_t now_us, uint32_t seen)
 {
-    if ((att->flags & seen) == 0u) {
-        att->flags = (uint16_t)(att->flags | seen);
+    const int32_t dt_us = evs_time_diff_us(now_us, *last_us);
+    if (!has_flag(att, seen)) {
+        set_flag(att, seen, true);
         *last_us = now_us;
         return 0u;
     }
-    const int32_t dt_us = evs_time_diff_us(now_us, *last_us);
     if (dt_us > 0) {
         *last_us = now_us;
         *n_back = 0u;
@@ -77,70 +66,116 @@ static uint32_t advance(evs_attitude_t *att, uint32_t *last_us, uint8_t *n_back,
     return 0u;
 }
 
-static void set_flag(evs_attitude_t *att, uint32_t flag, bool on)
+/* --- rotations ------------------------------------------------------------------------------------------------- */
+
+/* A small rotation as half its vector, Q32; a wide one (beyond half a radian) as its vector, Q28. */
+typedef struct {
+    evs_vec3_t v;
+    bool wide;
+} rotation_t;
+
+/* 16 dt / 10^6 in Q32, dt <= STEP_MAX_US: what takes rad/s in Q24 to rad in Q28. 2^32 16 / 10^6 = 68719 + 31243 / 2^16.
+ */
+static int32_t rotation_scale(uint32_t dt_us) { return (int32_t)(dt_us * 68719u + ((dt_us * 31243u) >> 16)); }
+
+static int32_t half_angle_q32(int32_t rate_q24, int32_t scale) { return upper29(mac(0, rate_q24, scale)); }
+
+/* The rotation by a constant rate for dt <= STEP_MAX_US; size = largest component. */
+static rotation_t rotation_of(evs_vec3_t rate_q24, uint32_t size, uint32_t dt_us)
 {
-    att->flags = (uint16_t)(on ? (att->flags | flag) : (att->flags & ~flag));
-}
-static bool has_flag(const evs_attitude_t *att, uint32_t flag) { return (att->flags & flag) != 0u; }
-
-static uint32_t max_u32(uint32_t a, uint32_t b) { return (a > b) ? a : b; }
-static uint32_t largest(evs_vec3_t v) { return max_u32(max_u32(evs_abs_u32(v.x), evs_abs_u32(v.y)), evs_abs_u32(v.z)); }
-static uint32_t add_sat_u32(uint32_t a, uint32_t b) { return (a > UINT32_MAX - b) ? UINT32_MAX : a + b; }
-
-/* ---- quaternion steps ---- */
-
-/* One Newton step to unit length; the input is within a few percent of it. */
-static evs_quat_t renormalized(evs_quat_t q)
-{
-    const int64_t norm_sq_q60 = (int64_t)q.w * q.w + (int64_t)q.x * q.x + (int64_t)q.y * q.y + (int64_t)q.z * q.z;
-    const int32_t scale_q30 = (int32_t)((INT64_C(3) << 29) - (norm_sq_q60 >> 31)); /* (3 - |q|^2) / 2 */
-    const evs_quat_t unit = {evs_q_mul(q.w, scale_q30, 30), evs_q_mul(q.x, scale_q30, 30),
-                             evs_q_mul(q.y, scale_q30, 30), evs_q_mul(q.z, scale_q30, 30)};
-    return unit;
-}
-
-/* exp of half the rotation vector; components of h (Q30) below 1.3. */
-static evs_quat_t exp_half(evs_vec3_t h_q30)
-{
-    const uint64_t hh_q60 = evs_vec3_norm_sq(h_q30);
-    if (hh_q60 >= (UINT64_C(1) << 56)) { /* beyond 1/4 rad: the full series, in Q28 of the whole angle */
-        const evs_vec3_t r_q28 = {evs_shr_r(h_q30.x, 1), evs_shr_r(h_q30.y, 1), evs_shr_r(h_q30.z, 1)};
-        return evs_quat_from_rotvec(r_q28);
+    const int32_t scale = rotation_scale(dt_us);
+    rotation_t r;
+    r.wide = (((uint64_t)size * dt_us) >> 32) > SMALL_TURN;
+    if (r.wide) {
+        r.v.x = fraction(rate_q24.x, scale);
+        r.v.y = fraction(rate_q24.y, scale);
+        r.v.z = fraction(rate_q24.z, scale);
+    } else {
+        r.v.x = half_angle_q32(rate_q24.x, scale);
+        r.v.y = half_angle_q32(rate_q24.y, scale);
+        r.v.z = half_angle_q32(rate_q24.z, scale);
     }
-    /* cos and sin(x) / x by their series to x^6: the next terms are below 2^-31 for x < 1/4. */
-    const int32_t u_q34 = (int32_t)(hh_q60 >> 26);
-    const int32_t u2 = evs_mul_hi(u_q34, u_q34); /* x^4, Q36 */
-    const int32_t u3 = evs_mul_hi(u2, u_q34);    /* x^6, Q38 */
-    const int32_t c =
-        EVS_ONE_Q30 - (u_q34 >> 5) + (evs_mul_hi(u2, INV_24_Q32) >> 6) - (evs_mul_hi(u3, INV_720_Q32) >> 8);
-    const int32_t s = EVS_ONE_Q30 - (evs_mul_hi(u_q34, INV_6_Q32) >> 4) + (evs_mul_hi(u2, INV_120_Q32) >> 6) -
-                      (evs_mul_hi(u3, INV_5040_Q32) >> 8);
-    const evs_quat_t q = {c, evs_q_mul(h_q30.x, s, 30), evs_q_mul(h_q30.y, s, 30), evs_q_mul(h_q30.z, s, 30)};
-    return q;
-}
-
-/* (1, h) q: a small rotation in the world, to first order; renormalized() makes it one of atan instead. */
-static evs_quat_t turned_by(evs_quat_t q, evs_vec3_t h_q30)
-{
-    const int64_t x = h_q30.x, y = h_q30.y, z = h_q30.z;
-    const evs_quat_t r = {evs_sat32(q.w - evs_shr_r64(x * q.x + y * q.y + z * q.z, 30)),
-                          evs_sat32(q.x + evs_shr_r64(x * q.w + y * q.z - z * q.y, 30)),
-                          evs_sat32(q.y + evs_shr_r64(y * q.w + z * q.x - x * q.z, 30)),
-                          evs_sat32(q.z + evs_shr_r64(z * q.w + x * q.y - y * q.x, 30))};
     return r;
 }
 
-/* rate (Q24) times dt, halved, in Q30: rate * dt_us * 2^5 / 10^6; 2^37 / 10^6 = 137438 + 62495 / 2^16. */
-static evs_vec3_t half_angle_q30(evs_vec3_t rate_q24, uint32_t dt_us)
+/* (1 - |q|^2) / 2 in Q32. |q| within 0.5 of 1. */
+static int32_t norm_defect(evs_quat_t q)
 {
-    const int64_t k_q32 = (int64_t)dt_us * 137438 + (((int64_t)dt_us * 62495) >> 16);
-    const evs_vec3_t h = {(int32_t)evs_shr_r64(rate_q24.x * k_q32, 32), (int32_t)evs_shr_r64(rate_q24.y * k_q32, 32),
-                          (int32_t)evs_shr_r64(rate_q24.z * k_q32, 32)};
-    return h;
+    return upper29(mac(mac(mac(mac(INT64_C(1) << 60, q.w, -q.w), q.x, -q.x), q.y, -q.y), q.z, -q.z));
 }
 
-/* The smallest turn that takes the unit vector `up` (Q30) to the vertical. */
-static evs_quat_t levelling(evs_vec3_t up)
+/* One step of Newton: what is left is 1.5 e^2. */
+static evs_quat_t plus_fraction(evs_quat_t q, int32_t e_q32)
+{
+    const evs_quat_t r = {q.w + fraction(q.w, e_q32), q.x + fraction(q.x, e_q32), q.y + fraction(q.y, e_q32),
+                          q.z + fraction(q.z, e_q32)};
+    return r;
+}
+
+evs_quat_t evs_attitude_renormalized(evs_quat_t q)
+{
+    int32_t e_q32 = norm_defect(q);
+    q = plus_fraction(q, e_q32);
+    for (int step = 0; (step < 3) && (evs_abs_u32(e_q32) >= NORM_DONE_Q32); step++) {
+        e_q32 = norm_defect(q);
+        q = plus_fraction(q, e_q32);
+    }
+    return q;
+}
+
+/* q in Q62, so that its upper word is q, and half an LSB of it. */
+static int64_t wide_half(int32_t q) { return (int64_t)(((uint64_t)(uint32_t)q << 32) | (uint64_t)HALF_Q32); }
+
+/*
+ * Turn the estimate by r, seen in the IMU, and by the correction due for dt, seen in the world:
+ * q' = q + q d + c q with d = exp(r) - 1 and c half the correction's vector, |c| <= 0.16; the product of the two
+ * small ones is left out. The series of d reach 2^-32 for |r| / 2 <= 1/4 rad, up to 2^-26 at its end.
+ */
+static void turn(evs_attitude_t *att, const rotation_t *r, uint32_t dt_us)
+{
+    evs_vec3_t h = r->v;
+    if (r->wide) {
+        att->q = evs_quat_mul(att->q, evs_quat_from_rotvec(r->v));
+        h = (evs_vec3_t){0, 0, 0};
+    }
+    const evs_quat_t q = att->q;
+    const int32_t u = upper(mac(mac(mac(0, h.x, h.x), h.y, h.y), h.z, h.z)); /* Q32, at most 1/16 */
+    const int32_t u2 = fraction_down(u, u);
+    const int32_t dw = fraction_down(u2, INV_24_Q32) - fraction_down(fraction_down(u2, u), INV_720_Q32) - (u >> 1);
+    const int32_t s = fraction_down(u2, INV_120_Q32) - fraction_down(u, INV_6_Q32); /* sin(x) / x - 1 */
+    const int32_t dx = h.x + fraction_down(h.x, s), dy = h.y + fraction_down(h.y, s), dz = h.z + fraction_down(h.z, s);
+
+    const int32_t scale = rotation_scale(dt_us);
+    const int32_t cx = half_angle_q32(att->correct_q24.x, scale);
+    const int32_t cy = half_angle_q32(att->correct_q24.y, scale);
+    const int32_t cz = half_angle_q32(att->correct_q24.z, scale);
+    const int32_t px = dx + cx, py = dy + cy, pz = dz + cz;
+    const int32_t mx = dx - cx, my = dy - cy, mz = dz - cz;
+
+    const int64_t w = mac(mac(mac(mac(wide_half(q.w), q.w, dw), q.x, -px), q.y, -py), q.z, -pz);
+    const int64_t x = mac(mac(mac(mac(wide_half(q.x), q.x, dw), q.w, px), q.y, mz), q.z, -my);
+    const int64_t y = mac(mac(mac(mac(wide_half(q.y), q.y, dw), q.w, py), q.z, mx), q.x, -mz);
+    const int64_t z = mac(mac(mac(mac(wide_half(q.z), q.z, dw), q.w, pz), q.x, my), q.y, -mx);
+    const evs_quat_t next = {upper(w), upper(x), upper(y), upper(z)};
+    const int32_t e_q32 = norm_defect(next);
+    att->q = plus_fraction(next, e_q32);
+    if (evs_abs_u32(e_q32) >= NORM_DONE_Q32) { att->q = evs_attitude_renormalized(att->q); }
+}
+
+/* v, of any size, seen from the world: with two fractional bits less, so that it always fits. */
+static evs_vec3_t seen_from_world(evs_quat_t q, evs_vec3_t v)
+{
+    /* v + 2 w t + 2 u x t with t = u x v and u the vector part. */
+    const int32_t tx = upper(mac(mac(HALF_Q32, q.y, v.z), -q.z, v.y));
+    const int32_t ty = upper(mac(mac(HALF_Q32, q.z, v.x), -q.x, v.z));
+    const int32_t tz = upper(mac(mac(HALF_Q32, q.x, v.y), -q.y, v.x));
+    const evs_vec3_t r = {(v.x >> 2) + upper29(mac(mac(mac(0, q.w, tx), q.y, tz), -q.z, ty)),
+                          (v.y >> 2) + upper29(mac(mac(mac(0, q.w, ty), q.z, tx), -q.x, tz)),
+                          (v.z >> 2) + upper29(mac(mac(mac(0, q.w, tz), q.x, ty), -q.y, tx))};
+    return r;
+}
+
+evs_quat_t evs_attitude_levelling(evs_vec3_t up)
 {
     /*
      * (1 + z, y, -x, 0) / length, halved to keep within Q30. Pointing down, 1 + z is all rounding error; there
@@ -160,8 +195,7 @@ static evs_quat_t levelling(evs_vec3_t up)
     return over;
 }
 
-/* The turn by a binary angle about the vertical. */
-static evs_quat_t about_vertical(int32_t angle)
+evs_quat_t evs_attitude_about_vertical(int32_t angle)
 {
     int32_t sin_q30, cos_q30;
     evs_sincos(angle / 2, &sin_q30, &cos_q30);
@@ -169,96 +203,113 @@ static evs_quat_t about_vertical(int32_t angle)
     return turn;
 }
 
-/* ---- the filter of [2] ---- */
+/* --- time constants that shorten and grow back ----------------------------------------------------------------- */
 
-#define VALENTI_GRAVITY_Q18 INT32_C(2571633)   /* 9.81 m/s^2 */
-#define VALENTI_STEADY_Q18  UINT32_C(26214)    /* 0.1 m/s^2 */
-#define VALENTI_CHANGE_Q24  UINT32_C(167772)   /* 0.01 rad/s from one sample to the next */
-#define VALENTI_RATE_Q24    UINT32_C(3355443)  /* 0.2 rad/s */
-#define VALENTI_LERP_Q30    INT32_C(966367642) /* 0.9: above it, interpolate linearly */
-
-/* The part `gain` (Q31) of a correction: linear for a small one, spherical for a large one. */
-static evs_quat_t part_of(evs_quat_t whole, int32_t gain)
+/* Towards `target` by dt / 2^log2_us, at most all the way. */
+static int32_t raised(int32_t w_q24, int32_t target_q24, uint32_t dt_us, unsigned log2_us)
 {
-    if (whole.w > VALENTI_LERP_Q30) {
-        const evs_quat_t part = {EVS_ONE_Q30 + evs_q_mul(whole.w - EVS_ONE_Q30, gain, 31), evs_q_mul(whole.x, gain, 31),
-                                 evs_q_mul(whole.y, gain, 31), evs_q_mul(whole.z, gain, 31)};
-        return renormalized(renormalized(part)); /* linear: short by up to 5 %, so twice */
-    }
-    const evs_vec3_t r_q28 = evs_vec3_scale(evs_quat_to_rotvec(whole), gain, 31);
-    return evs_quat_from_rotvec(r_q28);
+    if (w_q24 >= target_q24) { return w_q24; }
+    const int64_t next = w_q24 + ((((int64_t)target_q24 - w_q24) * (int64_t)dt_us) >> log2_us);
+    return (next > target_q24) ? target_q24 : (int32_t)next;
 }
 
-static void valenti_accel(evs_attitude_t *att, evs_vec3_t a_q18, uint32_t dt_us)
+static void recover(evs_attitude_t *att, uint32_t dt_us, unsigned log2_us)
 {
-    const int32_t norm_q18 = (int32_t)evs_sqrt_u64(evs_vec3_norm_sq(a_q18));
-    const uint32_t off_q18 = evs_abs_u32(norm_q18 - VALENTI_GRAVITY_Q18);
-    set_flag(att, VALENTI_STEADY, off_q18 <= VALENTI_STEADY_Q18);
-
-    int32_t gain = gain_q31(per_second_q24(att->cfg.tau_accel_ms), dt_us);
-    if (att->cfg.valenti_adaptive) { /* full up to 10 % off g, none from 20 % */
-        const int32_t tenths_q18 =
-            (int32_t)((VALENTI_GRAVITY_Q18 / 5u > off_q18) ? VALENTI_GRAVITY_Q18 / 5u - off_q18 : 0u);
-        const int32_t factor_q18 = evs_q_mul(tenths_q18, INT32_C(267217), 18); /* over g / 10 */
-        gain = evs_q_mul(gain, evs_clamp(factor_q18, 0, INT32_C(1) << 18), 18);
+    if (att->cfg.mode != EVS_ATTITUDE_FILTER) { return; }
+    const int32_t target_q24 = per_second_q24(att->cfg.tau_recover_ms);
+    if (!has_flag(att, EVS_ATTITUDE_SETTLING)) {
+        att->w_accel_q24 = raised(att->w_accel_q24, target_q24, dt_us, log2_us);
     }
-    evs_vec3_t up;
-    if (evs_vec3_normalize(evs_quat_rotate(att->q, a_q18), &up) != EVS_OK) { return; }
-    att->q = renormalized(evs_quat_mul(part_of(levelling(up), gain), att->q));
+    att->w_mag_q24 = raised(att->w_mag_q24, target_q24, dt_us, log2_us);
+    set_flag(att, EVS_ATTITUDE_RECOVERING, true);
 }
 
-static void valenti_mag(evs_attitude_t *att, evs_vec3_t world_q16, uint32_t dt_us)
+/* tau grows by dt / 2^halvings: d(1 / tau) = -(1 / tau)^2 dt / 2^halvings. */
+static int32_t relaxed(int32_t w_q24, int32_t final_q24, uint32_t dt_us, unsigned halvings)
 {
-    const int32_t off = (int32_t)((uint32_t)evs_atan2(world_q16.x, world_q16.y) - (uint32_t)att->cfg.declination);
-    const int32_t gain = gain_q31(per_second_q24(att->cfg.tau_mag_ms), dt_us);
-    att->q = renormalized(evs_quat_mul(part_of(about_vertical(off), gain), att->q));
+    if (w_q24 <= final_q24) { return final_q24; }
+    const int32_t next_q24 = w_q24 - (int32_t)(((int64_t)w_q24 * gain_q31(w_q24, dt_us)) >> (31u + halvings)) - 1;
+    return (next_q24 < final_q24) ? final_q24 : next_q24;
 }
 
-static void valenti_bias(evs_attitude_t *att, evs_vec3_t rate_q24, uint32_t dt_us)
+static void relax(evs_attitude_t *att, uint32_t dt_us)
 {
-    const evs_vec3_t change = evs_vec3_sub(rate_q24, att->rate_q24);
-    if (!has_flag(att, VALENTI_STEADY) || (largest(change) > VALENTI_CHANGE_Q24) ||
-        (largest(rate_q24) > VALENTI_RATE_Q24)) {
-        return;
+    const int32_t accel_q24 = per_second_q24(att->cfg.tau_accel_ms);
+    const int32_t mag_q24 = per_second_q24(att->cfg.tau_mag_ms);
+    if (!has_flag(att, EVS_ATTITUDE_SETTLING)) { att->w_accel_q24 = relaxed(att->w_accel_q24, accel_q24, dt_us, 0u); }
+    att->w_mag_q24 = relaxed(att->w_mag_q24, mag_q24, dt_us, 1u); /* slower than 1 / t: newer headings weigh more */
+    if ((att->w_accel_q24 == accel_q24) && (att->w_mag_q24 == mag_q24)) {
+        set_flag(att, EVS_ATTITUDE_RECOVERING, false);
     }
-    const int32_t gain = gain_q31(per_second_q24(att->cfg.tau_accel_ms), dt_us);
-    att->bias_q30.x = evs_add_sat(att->bias_q30.x, evs_q_mul(rate_q24.x, gain, 25));
-    att->bias_q30.y = evs_add_sat(att->bias_q30.y, evs_q_mul(rate_q24.y, gain, 25));
-    att->bias_q30.z = evs_add_sat(att->bias_q30.z, evs_q_mul(rate_q24.z, gain, 25));
+}
+
+/* --- gyro: rest and bias --------------------------------------------------------------------------------------- */
+
+static void learn_bias_at_rest(evs_attitude_t *att, uint32_t dt_us)
+{
+    const evs_vec3_t off_q24 = {att->gyro_lp_q24.x - (att->bias_q30.x >> 6),
+                                att->gyro_lp_q24.y - (att->bias_q30.y >> 6),
+                                att->gyro_lp_q24.z - (att->bias_q30.z >> 6)};
+    int32_t gain = (int32_t)(dt_us * BIAS_REST_Q31);
+    if (!has_flag(att, EVS_ATTITUDE_BIAS_KNOWN)) {
+        gain = INT32_MAX; /* the running mean as it is; refined from here */
+    } else if (largest(off_q24) > (uint32_t)att->bias_step_q31 >> 7) {
+        if (att->rest_us < RELEARN_US) { return; }
+        gain = INT32_MAX;
+    }
+    att->bias_q30.x += evs_q_mul(off_q24.x, gain, 25);
+    att->bias_q30.y += evs_q_mul(off_q24.y, gain, 25);
+    att->bias_q30.z += evs_q_mul(off_q24.z, gain, 25);
+    att->bias_step_q31 = BIAS_STEP_Q31;
     set_flag(att, EVS_ATTITUDE_BIAS_KNOWN, true);
 }
 
-/* ---- gyro ---- */
-
-static void shorten(evs_attitude_t *att, int32_t *w_q24, int32_t target_q24, uint32_t dt_us, uint32_t tau_us_log2)
+static int32_t follow(int32_t *mean, int32_t x, int32_t gain_q32)
 {
-    if (*w_q24 < target_q24) {
-        const int64_t step = (((int64_t)target_q24 - *w_q24) * (int64_t)dt_us) >> tau_us_log2;
-        const int64_t next = *w_q24 + step;
-        *w_q24 = (next > target_q24) ? target_q24 : (int32_t)next;
-        set_flag(att, EVS_ATTITUDE_RECOVERING, true);
+    const int32_t off = x - *mean;
+    *mean += fraction(off, gain_q32);
+    return off;
+}
+
+static void watch_gyro(evs_attitude_t *att, evs_vec3_t raw_q24, uint32_t size, uint32_t dt_us)
+{
+    const uint32_t still_q24 = att->cfg.rest_gyro_mrad_s * UINT32_C(16777);
+    const uint32_t bias_max_q24 = att->cfg.bias_max_mrad_s * UINT32_C(16777);
+    const bool moving = size > still_q24 + bias_max_q24;
+    bool still = false;
+    if (!moving && has_flag(att, MOVING)) { att->gyro_lp_q24 = raw_q24; } /* quiet again: start from here */
+    if (!moving) {
+        const int32_t gain_q32 = (int32_t)(dt_us * REST_GAIN_Q32);
+        const evs_vec3_t off = {follow(&att->gyro_lp_q24.x, raw_q24.x, gain_q32),
+                                follow(&att->gyro_lp_q24.y, raw_q24.y, gain_q32),
+                                follow(&att->gyro_lp_q24.z, raw_q24.z, gain_q32)};
+        still =
+            (largest(off) <= still_q24) && (largest(att->gyro_lp_q24) <= bias_max_q24) && has_flag(att, ACCEL_STEADY);
+    }
+    att->rest_us = still ? add_sat_u32(att->rest_us, dt_us) : 0u;
+    const bool rest = att->rest_us >= att->cfg.rest_time_ms * UINT32_C(1000);
+    att->flags &= ~(MOVING | EVS_ATTITUDE_AT_REST);
+    if (moving) { att->flags |= MOVING; }
+    if (rest) {
+        att->flags |= EVS_ATTITUDE_AT_REST;
+        if (att->cfg.learn_bias && (att->cfg.mode != EVS_ATTITUDE_VALENTI)) { learn_bias_at_rest(att, dt_us); }
+    } else if (att->bias_step_q31 < (INT32_C(1) << 30)) {
+        att->bias_step_q31 += (int32_t)((dt_us * BIAS_DRIFT_Q20) >> 20);
     }
 }
 
-static void recover(evs_attitude_t *att, uint32_t dt_us, uint32_t tau_us_log2)
-{
-    if (att->cfg.mode != EVS_ATTITUDE_FILTER) { return; }
-    if (!has_flag(att, EVS_ATTITUDE_SETTLING)) {
-        shorten(att, &att->w_accel_q24, corner_q24(att->cfg.tau_recover_ms), dt_us, tau_us_log2);
-    }
-    shorten(att, &att->w_mag_q24, per_second_q24(att->cfg.tau_recover_ms), dt_us, tau_us_log2);
-}
+/* --- gyro: integration ----------------------------------------------------------------------------------------- */
 
 /* Is this sample clipped? Either the limit is given, or it shows as the largest value seen, repeating unchanged. */
-static bool is_clipped(evs_attitude_t *att, uint32_t rate)
+static bool is_clipped(evs_attitude_t *att, uint32_t size)
 {
-    if (att->cfg.gyro_limit_rad_s_q24 != 0) { return rate >= (uint32_t)att->cfg.gyro_limit_rad_s_q24; }
-    if (rate > (uint32_t)att->gyro_max_q24) {
-        att->gyro_max_q24 = (int32_t)((rate > (uint32_t)INT32_MAX) ? (uint32_t)INT32_MAX : rate);
+    if (att->cfg.gyro_limit_rad_s_q24 != 0) { return size >= (uint32_t)att->cfg.gyro_limit_rad_s_q24; }
+    if (size > att->gyro_max_q24) {
+        att->gyro_max_q24 = size;
         att->n_repeats = 1u;
         return false;
     }
-    if ((rate < (uint32_t)att->gyro_max_q24) || (rate < (uint32_t)CLIP_MIN_Q24)) {
+    if ((size < att->gyro_max_q24) || (size < CLIP_MIN_Q24)) {
         if (att->n_repeats < RUN_OF_EQUALS) { att->n_repeats = 0u; } /* once found, the limit stays found */
         return false;
     }
@@ -266,247 +317,223 @@ static bool is_clipped(evs_attitude_t *att, uint32_t rate)
     return att->n_repeats >= RUN_OF_EQUALS;
 }
 
-static void learn_bias(evs_attitude_t *att, uint32_t dt_us)
-{
-    const evs_vec3_t off_q28 = {att->gyro_lp_q28.x - (att->bias_q30.x >> 2),
-                                att->gyro_lp_q28.y - (att->bias_q30.y >> 2),
-                                att->gyro_lp_q28.z - (att->bias_q30.z >> 2)};
-    int32_t gain = gain_q31(att->bias_gain_q24, dt_us);
-    if (!has_flag(att, EVS_ATTITUDE_BIAS_KNOWN)) {
-        gain = INT32_MAX; /* the running mean as it is; refined from here */
-    } else if (largest(off_q28) > (uint32_t)att->bias_step_q31 >> 3) {
-        if (att->rest_us < RELEARN_US) { return; }
-        att->bias_gain_q24 = BIAS_GAIN_0_Q24;
-        gain = INT32_MAX;
-    }
-    att->bias_q30.x += evs_q_mul(off_q28.x, gain, 29);
-    att->bias_q30.y += evs_q_mul(off_q28.y, gain, 29);
-    att->bias_q30.z += evs_q_mul(off_q28.z, gain, 29);
-    if (att->bias_gain_q24 > BIAS_GAIN_Q24) { /* 1 / (t + 1/3 s): the plain mean since rest began */
-        att->bias_gain_q24 -= evs_q_mul(att->bias_gain_q24, gain_q31(att->bias_gain_q24, dt_us), 31) + 1;
-    }
-    att->bias_step_q31 = BIAS_STEP_Q31;
-    set_flag(att, EVS_ATTITUDE_BIAS_KNOWN, true);
-}
-
-static int32_t follow(int32_t *mean_q28, int32_t rate_q24, int32_t gain)
-{
-    const int32_t x_q28 = evs_clamp(rate_q24, -(INT32_C(1) << 26), INT32_C(1) << 26) * 16; /* +-4 rad/s */
-    const int32_t off = x_q28 - *mean_q28;
-    *mean_q28 += evs_q_mul(off, gain, 31);
-    return off;
-}
-
-static void watch_gyro(evs_attitude_t *att, evs_vec3_t rate_q24, uint32_t dt_us)
-{
-    const int32_t gain = (int32_t)dt_us * 6136; /* Q31 of dt / REST_TAU_US; dt <= STEP_MAX_US */
-    const evs_vec3_t off = {follow(&att->gyro_lp_q28.x, rate_q24.x, gain),
-                            follow(&att->gyro_lp_q28.y, rate_q24.y, gain),
-                            follow(&att->gyro_lp_q28.z, rate_q24.z, gain)};
-    const uint32_t limit_q28 = att->cfg.rest_gyro_mrad_s * UINT32_C(268435);
-    const uint32_t bias_max_q28 = att->cfg.bias_max_mrad_s * UINT32_C(268435);
-    const bool still =
-        (largest(off) <= limit_q28) && (largest(att->gyro_lp_q28) <= bias_max_q28) && has_flag(att, ACCEL_STEADY);
-    att->rest_us = still ? add_sat_u32(att->rest_us, dt_us) : 0u;
-    const bool rest = att->rest_us >= att->cfg.rest_time_ms * UINT32_C(1000);
-    set_flag(att, EVS_ATTITUDE_AT_REST, rest);
-    if (rest) {
-        if (att->cfg.learn_bias && (att->cfg.mode != EVS_ATTITUDE_VALENTI)) { learn_bias(att, dt_us); }
-    } else {
-        att->bias_step_q31 = evs_add_sat(att->bias_step_q31, (int32_t)((dt_us * BIAS_DRIFT_Q20) >> 20));
-    }
-}
-
-/* Let a shortened time constant grow back by `growth_q16` seconds a second: d(1/tau) = -(1/tau)^2 growth dt. */
-static int32_t relaxed(int32_t w_q24, int32_t final_q24, uint32_t dt_us, int32_t growth_q16)
-{
-    if (w_q24 <= final_q24) { return final_q24; }
-    const int32_t gain = gain_q31(w_q24, dt_us);
-    const int32_t next = w_q24 - evs_q_mul(evs_q_mul(w_q24, gain, 31), growth_q16, 16) - 1;
-    return (next < final_q24) ? final_q24 : next;
-}
-
-/* Turn by the rotation vector 2 h in the IMU's frame and by the correction due for dt, in steps that the series bear.
- */
-static void turn(evs_attitude_t *att, evs_vec3_t h_q30, uint32_t dt_us)
-{
-    evs_quat_t q = evs_quat_mul(att->q, exp_half(h_q30));
-    if (att->cfg.mode == EVS_ATTITUDE_FILTER) { q = turned_by(q, half_angle_q30(att->correct_q24, dt_us)); }
-    att->q = renormalized(q);
-}
-
 static evs_vec3_t mean_of(evs_vec3_t a, evs_vec3_t b)
 {
-    const evs_vec3_t m = {(int32_t)(((int64_t)a.x + b.x) >> 1), (int32_t)(((int64_t)a.y + b.y) >> 1),
-                          (int32_t)(((int64_t)a.z + b.z) >> 1)};
+    const evs_vec3_t m = {(a.x >> 1) + (b.x >> 1), (a.y >> 1) + (b.y >> 1), (a.z >> 1) + (b.z >> 1)};
     return m;
+}
+
+/* Half the difference, which always fits. */
+static evs_vec3_t half_diff(evs_vec3_t a, evs_vec3_t b)
+{
+    const evs_vec3_t d = {(a.x >> 1) - (b.x >> 1), (a.y >> 1) - (b.y >> 1), (a.z >> 1) - (b.z >> 1)};
+    return d;
 }
 
 /* Constant rate over any time: full steps, then the rest. */
 static void bridge(evs_attitude_t *att, evs_vec3_t rate_q24, uint32_t dt_us)
 {
     while (dt_us > 0u) {
-        const uint32_t step_us = (dt_us > STEP_MAX_US) ? STEP_MAX_US : dt_us;
-        turn(att, half_angle_q30(rate_q24, step_us), step_us);
+        const uint32_t step_us = min_u32(dt_us, STEP_MAX_US);
+        const rotation_t r = rotation_of(rate_q24, largest(rate_q24), step_us);
+        turn(att, &r, step_us);
         dt_us -= step_us;
     }
 }
 
-/* A lone sample far off both neighbours is a glitch: replace what it turned by the mean of the neighbours. */
+/*
+ * A lone sample far off both neighbours is a glitch: replace what it turned by the mean of the neighbours. The sample
+ * on trial is att->rate_q24. Returns whether it was one.
+ */
 static bool take_back_spike(evs_attitude_t *att, evs_vec3_t rate_q24)
 {
-    const evs_vec3_t jump_q8 = {(att->rate_q24.x >> 16) - att->rate_before_q8[0],
-                                (att->rate_q24.y >> 16) - att->rate_before_q8[1],
-                                (att->rate_q24.z >> 16) - att->rate_before_q8[2]};
-    const uint32_t jump = largest(jump_q8);
-    if (jump <= (uint32_t)SPIKE_Q8) { return false; }
-    const evs_vec3_t across_q8 = {(rate_q24.x >> 16) - att->rate_before_q8[0],
-                                  (rate_q24.y >> 16) - att->rate_before_q8[1],
-                                  (rate_q24.z >> 16) - att->rate_before_q8[2]};
-    if (largest(across_q8) > jump / 4u) { return false; }
     const evs_vec3_t before_q24 = {att->rate_before_q8[0] * 65536, att->rate_before_q8[1] * 65536,
                                    att->rate_before_q8[2] * 65536};
-    const evs_vec3_t undo = evs_vec3_sub(mean_of(before_q24, rate_q24), att->rate_q24);
-    att->q = renormalized(evs_quat_mul(att->q, exp_half(half_angle_q30(undo, att->dt_newest_us))));
+    const uint32_t jump = largest(half_diff(att->rate_q24, before_q24));
+    if (largest(half_diff(rate_q24, before_q24)) > jump / 4u) { return false; }
+    const evs_vec3_t spike_q24 = {-att->rate_q24.x, -att->rate_q24.y, -att->rate_q24.z};
+    const evs_vec3_t mean_q24 = mean_of(before_q24, rate_q24);
+    const evs_vec3_t correct_q24 = att->correct_q24;
+    att->correct_q24 = (evs_vec3_t){0, 0, 0};
+    bridge(att, spike_q24, att->dt_newest_us);
+    bridge(att, mean_q24, att->dt_newest_us);
+    att->correct_q24 = correct_q24;
     evs_count(&att->faults.n_gyro_spikes);
     return true;
 }
 
-static evs_vec3_t less_bias(const evs_attitude_t *att, evs_vec3_t rate_q24)
+static void look_for_spike(evs_attitude_t *att, evs_vec3_t rate_q24)
 {
-    const evs_vec3_t bias_q24 = {evs_shr_r(att->bias_q30.x, 6), evs_shr_r(att->bias_q30.y, 6),
-                                 evs_shr_r(att->bias_q30.z, 6)};
-    return evs_vec3_sub(rate_q24, bias_q24);
-}
-
-static void remember(evs_attitude_t *att, evs_vec3_t before_q24, evs_vec3_t rate_q24)
-{
-    att->rate_before_q8[0] = (int16_t)(before_q24.x >> 16);
-    att->rate_before_q8[1] = (int16_t)(before_q24.y >> 16);
-    att->rate_before_q8[2] = (int16_t)(before_q24.z >> 16);
-    att->rate_q24 = rate_q24;
-}
-
-/* Grow the shortened time constants back, and lower the flag when both have arrived. */
-static void relax(evs_attitude_t *att, uint32_t dt_us)
-{
-    const int32_t accel_q24 = corner_q24(att->cfg.tau_accel_ms);
-    const int32_t mag_q24 = per_second_q24(att->cfg.tau_mag_ms);
-    if (!has_flag(att, EVS_ATTITUDE_SETTLING)) {
-        att->w_accel_q24 = relaxed(att->w_accel_q24, accel_q24, dt_us, 46341); /* corner = sqrt(2) / tau; tau + 1 s/s */
+    if (has_flag(att, SPIKE_SUSPECT)) {
+        set_flag(att, SPIKE_SUSPECT, false);
+        if (take_back_spike(att, rate_q24)) {
+            att->rate_q24 = rate_q24; /* as the rate before the newest */
+            return;
+        }
     }
-    att->w_mag_q24 = relaxed(att->w_mag_q24, mag_q24, dt_us, 19661); /* 0.3 s/s: newer headings weigh more */
-    if ((att->w_accel_q24 == accel_q24) && (att->w_mag_q24 == mag_q24)) {
-        set_flag(att, EVS_ATTITUDE_RECOVERING, false);
+    if (largest(half_diff(rate_q24, att->rate_q24)) > SPIKE_Q23) {
+        set_flag(att, SPIKE_SUSPECT, true);
+        att->rate_before_q8[0] = (int16_t)(att->rate_q24.x >> 16);
+        att->rate_before_q8[1] = (int16_t)(att->rate_q24.y >> 16);
+        att->rate_before_q8[2] = (int16_t)(att->rate_q24.z >> 16);
     }
 }
 
-/*
- * What both kinds of gyro sample share. The sample tells the rotation of the last dt_us, as half a rotation vector;
- * since_us have gone by since the sample before, and what lies between is bridged by the mean of both rates.
- */
-static void gyro_step(evs_attitude_t *att, evs_vec3_t raw_q24, evs_vec3_t rate_q24, evs_vec3_t h_q30, uint32_t dt_us,
-                      uint32_t since_us)
+/* A sensor that fell silent must not go on turning the estimate. */
+static void drop_stale_corrections(evs_attitude_t *att)
 {
-    const uint32_t trim_us = (since_us > STEP_MAX_US) ? STEP_MAX_US : since_us;
-    const bool clipped = is_clipped(att, largest(raw_q24));
+    if (evs_time_diff_us(att->t_gyro_us, att->t_accel_us) > STALE_US) {
+        att->correct_q24.x = 0;
+        att->correct_q24.y = 0;
+        att->flags &= ~ACCEL_STEADY;
+    }
+    if (evs_time_diff_us(att->t_gyro_us, att->t_mag_us) > STALE_US) { att->correct_q24.z = 0; }
+}
+
+/* One gyro sample of either kind. */
+typedef struct {
+    evs_vec3_t raw_q24;  /* rate as measured, rad/s */
+    evs_vec3_t rate_q24; /* less bias */
+    rotation_t r;        /* what it tells: the rotation of the last dt_us, less bias */
+    uint32_t size;       /* largest component of raw_q24 */
+    uint32_t dt_us;      /* at most STEP_MAX_US */
+    uint32_t since_us;   /* gone by since the sample before: what lies between is bridged by the mean of both rates */
+} gyro_sample_t;
+
+static void gyro_step(evs_attitude_t *att, const gyro_sample_t *g)
+{
+    const uint32_t trim_us = min_u32(g->since_us, STEP_MAX_US);
+    const bool clipped = is_clipped(att, g->size);
     set_flag(att, EVS_ATTITUDE_GYRO_SATURATED, clipped);
     if (clipped) {
         evs_count(&att->faults.n_gyro_saturated);
         recover(att, trim_us, 15); /* within about 33 ms */
     }
-    const evs_vec3_t before_q24 = take_back_spike(att, rate_q24) ? rate_q24 : att->rate_q24;
+    look_for_spike(att, g->rate_q24);
+    drop_stale_corrections(att);
 
-    if (since_us > att->cfg.gap_max_ms * UINT32_C(1000)) {
+    if (g->since_us > att->cfg.gap_max_ms * UINT32_C(1000)) {
         evs_count(&att->faults.n_gyro_gaps);
         recover(att, 1u, 0);
         att->rest_us = 0u;
     } else {
-        if (since_us > dt_us) { bridge(att, mean_of(before_q24, rate_q24), since_us - dt_us); }
-        turn(att, h_q30, dt_us);
-        watch_gyro(att, raw_q24, trim_us);
-        if (att->cfg.learn_bias && (att->cfg.mode == EVS_ATTITUDE_VALENTI)) { valenti_bias(att, rate_q24, trim_us); }
+        if (g->since_us > g->dt_us) { bridge(att, mean_of(att->rate_q24, g->rate_q24), g->since_us - g->dt_us); }
+        turn(att, &g->r, g->dt_us);
+        watch_gyro(att, g->raw_q24, g->size, trim_us);
+        if (att->cfg.learn_bias && (att->cfg.mode == EVS_ATTITUDE_VALENTI)) {
+            evs_attitude_valenti_bias(att, g->rate_q24, trim_us);
+        }
     }
-    remember(att, before_q24, rate_q24);
-    att->dt_newest_us = dt_us;
+    att->rate_q24 = g->rate_q24;
+    att->dt_newest_us = (uint16_t)g->dt_us;
     if (has_flag(att, EVS_ATTITUDE_RECOVERING)) { relax(att, trim_us); }
+}
+
+/* The rate with room for the bias, and less it. */
+static void set_rate(gyro_sample_t *g, const evs_attitude_t *att, evs_vec3_t rate_q24)
+{
+    g->size = largest(rate_q24);
+    if (g->size > (uint32_t)RATE_MAX_Q24) {
+        rate_q24.x = evs_clamp(rate_q24.x, -RATE_MAX_Q24, RATE_MAX_Q24);
+        rate_q24.y = evs_clamp(rate_q24.y, -RATE_MAX_Q24, RATE_MAX_Q24);
+        rate_q24.z = evs_clamp(rate_q24.z, -RATE_MAX_Q24, RATE_MAX_Q24);
+    }
+    g->raw_q24 = rate_q24;
+    g->rate_q24.x = rate_q24.x - (att->bias_q30.x >> 6);
+    g->rate_q24.y = rate_q24.y - (att->bias_q30.y >> 6);
+    g->rate_q24.z = rate_q24.z - (att->bias_q30.z >> 6);
 }
 
 void evs_attitude_push_gyro(evs_attitude_t *att, uint32_t t_us, evs_vec3_t rate_rad_s_q24)
 {
     EVS_ASSERT(att != NULL);
-    const evs_vec3_t rate_q24 = less_bias(att, rate_rad_s_q24);
     const bool first = !has_flag(att, SEEN_GYRO);
-    const uint32_t since_us = advance(att, &att->t_gyro_us, &att->n_time_back[0], t_us, SEEN_GYRO);
-    if (first) { remember(att, rate_q24, rate_q24); }
-    if (since_us == 0u) { return; }
+    gyro_sample_t g;
+    set_rate(&g, att, rate_rad_s_q24);
+    g.since_us = advance(att, &att->t_gyro_us, &att->n_time_back[0], t_us, SEEN_GYRO);
+    if (first) { att->rate_q24 = g.rate_q24; }
+    if (g.since_us == 0u) { return; }
 
     /* The usual interval follows slowly, upwards very slowly: a longer one is taken as a loss of samples. */
-    const uint32_t usual_us = att->dt_gyro_us;
-    uint32_t dt_us = since_us;
+    uint32_t usual_us = att->dt_gyro_us;
+    g.dt_us = g.since_us;
     if (usual_us == 0u) {
-        att->dt_gyro_us = (since_us > STEP_MAX_US) ? STEP_MAX_US : since_us;
-    } else if (since_us <= usual_us + usual_us / 2u) {
-        att->dt_gyro_us = usual_us - usual_us / 8u + (since_us + 4u) / 8u;
+        usual_us = g.since_us;
+    } else if (g.since_us <= usual_us + usual_us / 2u) {
+        usual_us += (g.since_us + 4u) / 8u - usual_us / 8u;
     } else {
-        att->dt_gyro_us = (usual_us >= STEP_MAX_US) ? STEP_MAX_US : usual_us + usual_us / 32u + 1u;
-        dt_us = usual_us;
+        g.dt_us = usual_us;
+        usual_us += usual_us / 32u + 1u;
     }
-    if (dt_us > STEP_MAX_US) { dt_us = STEP_MAX_US; }
-    gyro_step(att, rate_rad_s_q24, rate_q24, half_angle_q30(rate_q24, dt_us), dt_us, since_us);
+    att->dt_gyro_us = (uint16_t)min_u32(usual_us, STEP_MAX_US);
+    g.dt_us = min_u32(g.dt_us, STEP_MAX_US);
+    g.r = rotation_of(g.rate_q24, g.size + BIAS_LIMIT_Q24, g.dt_us);
+    gyro_step(att, &g);
 }
 
 void evs_attitude_push_delta_angle(evs_attitude_t *att, uint32_t t_us, evs_vec3_t angle_rad_q30, uint32_t dt_us)
 {
     EVS_ASSERT(att != NULL);
-    if ((dt_us == 0u) || (dt_us > 1000000u)) {
+    if ((dt_us == 0u) || (dt_us > EVS_ATTITUDE_DELTA_MAX_US)) {
         evs_count(&att->faults.n_time_bad);
         return;
     }
     /* The rate is the angle over the time: 10^6 / 2^6 / dt in Q24, by the reciprocal. */
     unsigned shift;
-    const uint32_t r = evs_recip_u32(dt_us, &shift);
-    const int64_t per_us_q20 = (int64_t)(((uint64_t)r * 15625u) >> (shift - 20u));
-    const evs_vec3_t raw_q24 = {evs_sat32(evs_shr_r64(angle_rad_q30.x * per_us_q20, 20)),
-                                evs_sat32(evs_shr_r64(angle_rad_q30.y * per_us_q20, 20)),
-                                evs_sat32(evs_shr_r64(angle_rad_q30.z * per_us_q20, 20))};
-    const evs_vec3_t rate_q24 = less_bias(att, raw_q24);
-
+    const uint32_t inverse = evs_recip_u32(dt_us, &shift);
+    const int64_t per_us_q20 = (int64_t)(((uint64_t)inverse * 15625u) >> (shift - 20u));
+    const evs_vec3_t rate_q24 = {evs_sat32(evs_shr_r64(angle_rad_q30.x * per_us_q20, 20)),
+                                 evs_sat32(evs_shr_r64(angle_rad_q30.y * per_us_q20, 20)),
+                                 evs_sat32(evs_shr_r64(angle_rad_q30.z * per_us_q20, 20))};
     const bool first = !has_flag(att, SEEN_GYRO);
-    uint32_t since_us = advance(att, &att->t_gyro_us, &att->n_time_back[0], t_us, SEEN_GYRO);
+    gyro_sample_t g;
+    set_rate(&g, att, rate_q24);
+    g.dt_us = dt_us;
+    g.since_us = advance(att, &att->t_gyro_us, &att->n_time_back[0], t_us, SEEN_GYRO);
     if (first) {
-        remember(att, rate_q24, rate_q24);
-        since_us = dt_us; /* an increment knows its own length */
+        att->rate_q24 = g.rate_q24;
+        g.since_us = dt_us; /* an increment knows its own length */
     }
-    if (since_us == 0u) { return; }
-    if ((since_us < dt_us) || (since_us - dt_us < dt_us / 4u)) { since_us = dt_us; } /* jitter of the time stamps */
-    att->dt_gyro_us = (dt_us > STEP_MAX_US) ? STEP_MAX_US : dt_us;
+    if (g.since_us == 0u) { return; }
+    if (g.since_us < dt_us + dt_us / 4u) { g.since_us = dt_us; } /* jitter of the time stamps */
 
-    const evs_vec3_t bias_q24 = evs_vec3_sub(raw_q24, rate_q24);
-    const evs_vec3_t drift = half_angle_q30(bias_q24, dt_us); /* below 1/2 rad/s for 1 s */
-    const evs_vec3_t h_q30 = {(int32_t)(((int64_t)angle_rad_q30.x + 1) >> 1) - drift.x,
-                              (int32_t)(((int64_t)angle_rad_q30.y + 1) >> 1) - drift.y,
-                              (int32_t)(((int64_t)angle_rad_q30.z + 1) >> 1) - drift.z};
-    gyro_step(att, raw_q24, rate_q24, h_q30, dt_us, since_us);
+    const int32_t scale = rotation_scale(dt_us);
+    g.r.wide = largest(angle_rad_q30) > UINT32_C(300000000); /* 0.28 rad */
+    if (g.r.wide) {
+        g.r.v.x = evs_shr_r(angle_rad_q30.x >> 1, 1) - fraction(att->bias_q30.x >> 6, scale);
+        g.r.v.y = evs_shr_r(angle_rad_q30.y >> 1, 1) - fraction(att->bias_q30.y >> 6, scale);
+        g.r.v.z = evs_shr_r(angle_rad_q30.z >> 1, 1) - fraction(att->bias_q30.z >> 6, scale);
+    } else { /* half of it in Q32 is twice it in Q30 */
+        g.r.v.x = angle_rad_q30.x * 2 - half_angle_q32(att->bias_q30.x >> 6, scale);
+        g.r.v.y = angle_rad_q30.y * 2 - half_angle_q32(att->bias_q30.y >> 6, scale);
+        g.r.v.z = angle_rad_q30.z * 2 - half_angle_q32(att->bias_q30.z >> 6, scale);
+    }
+    gyro_step(att, &g);
 }
 
-/* ---- accelerometer ---- */
+/* --- accelerometer --------------------------------------------------------------------------------------------- */
 
 static void watch_accel(evs_attitude_t *att, evs_vec3_t a_q20, uint32_t dt_us)
 {
-    const int32_t gain = (int32_t)((dt_us > STEP_MAX_US) ? STEP_MAX_US : dt_us) * 6136; /* Q31 of dt / REST_TAU_US */
-    evs_vec3_t *mean = &att->accel_lp_q20;
-    const evs_vec3_t off = {evs_sub_sat(a_q20.x, mean->x), evs_sub_sat(a_q20.y, mean->y),
-                            evs_sub_sat(a_q20.z, mean->z)};
-    mean->x += evs_q_mul(off.x, gain, 31);
-    mean->y += evs_q_mul(off.y, gain, 31);
-    mean->z += evs_q_mul(off.z, gain, 31);
-    const evs_vec3_t wander_q7 = {(mean->x >> 13) - att->accel_ref_q7[0], (mean->y >> 13) - att->accel_ref_q7[1],
-                                  (mean->z >> 13) - att->accel_ref_q7[2]};
+    evs_vec3_t *const mean = &att->accel_lp_q20;
+    if (has_flag(att, MOVING)) {
+        *mean = a_q20;
+        att->flags &= ~ACCEL_STEADY;
+        return;
+    }
+    const int32_t gain_q32 = (int32_t)(min_u32(dt_us, STEP_MAX_US) * REST_GAIN_Q32);
+    const evs_vec3_t half_off = half_diff(a_q20, *mean);
+    mean->x += fraction(half_off.x, 2 * gain_q32);
+    mean->y += fraction(half_off.y, 2 * gain_q32);
+    mean->z += fraction(half_off.z, 2 * gain_q32);
 
     /* Gravity must also keep its direction: a slow turn has a constant rate, but it carries gravity along. */
-    const bool steady = (largest(off) <= att->cfg.rest_accel_mm_s2 * UINT32_C(1049)) &&
-                        (largest(wander_q7) <= (uint32_t)ACCEL_DRIFT_Q7);
+    bool steady = largest(half_off) <= (att->cfg.rest_accel_mm_s2 * UINT32_C(1049)) / 2u;
+    if (steady) {
+        const evs_vec3_t wander_q7 = {(mean->x >> 13) - att->accel_ref_q7[0], (mean->y >> 13) - att->accel_ref_q7[1],
+                                      (mean->z >> 13) - att->accel_ref_q7[2]};
+        steady = largest(wander_q7) <= ACCEL_DRIFT_Q7;
+    }
     set_flag(att, ACCEL_STEADY, steady);
     if (!steady) {
         att->rest_us = 0u;
@@ -516,22 +543,24 @@ static void watch_accel(evs_attitude_t *att, evs_vec3_t a_q20, uint32_t dt_us)
     }
 }
 
-static void start_tilt(evs_attitude_t *att, evs_vec3_t a_q18)
+static void start_tilt(evs_attitude_t *att, evs_vec3_t world_q18)
 {
     evs_vec3_t up;
-    if (evs_vec3_normalize(evs_quat_rotate(att->q, a_q18), &up) != EVS_OK) { return; } /* not a zero vector: checked */
-    att->q = renormalized(evs_quat_mul(levelling(up), att->q));
-    att->gravity_q24 = evs_sat32((int64_t)evs_sqrt_u64(evs_vec3_norm_sq(a_q18)) * 64);
-    att->w_accel_q24 = GAIN_MAX_Q24;
+    if (evs_vec3_normalize(world_q18, &up) != EVS_OK) { return; } /* too small to have a direction */
+    att->q = evs_attitude_renormalized(evs_quat_mul(evs_attitude_levelling(up), att->q));
+    att->gravity_q24 = evs_sat32((int64_t)evs_sqrt_u64(evs_vec3_norm_sq(world_q18)) * 64);
     set_flag(att, EVS_ATTITUDE_TILT_KNOWN, true);
-    set_flag(att, EVS_ATTITUDE_SETTLING, att->cfg.mode == EVS_ATTITUDE_FILTER);
+    if (att->cfg.mode == EVS_ATTITUDE_FILTER) {
+        att->w_accel_q24 = GAIN_MAX_Q24;
+        set_flag(att, EVS_ATTITUDE_SETTLING, true);
+    }
 }
 
 /* The mean acceleration points down: half a turn puts it right at once, which a rate could not. */
 static void turn_over(evs_attitude_t *att)
 {
     const evs_quat_t over = {0, EVS_ONE_Q30, 0, 0};
-    att->q = evs_quat_mul(over, att->q);
+    att->q = evs_attitude_renormalized(evs_quat_mul(over, att->q));
     att->gravity_q24 = evs_sub_sat(0, att->gravity_q24);
     att->slope_q24.y = evs_sub_sat(0, att->slope_q24.y);
     att->slope_q24.z = evs_sub_sat(0, att->slope_q24.z);
@@ -539,18 +568,44 @@ static void turn_over(evs_attitude_t *att)
     att->mag_lp_q16.z = evs_sub_sat(0, att->mag_lp_q16.z);
 }
 
-/* While settling: the plain mean of all accelerations so far, by a gain of 1 / elapsed time. */
-static void settle(evs_attitude_t *att, evs_vec3_t a_q18, uint32_t dt_us)
+/* x + dx without overflow; quick where there is none. */
+static int32_t plus_sat(int32_t x, int64_t dx)
 {
-    const int32_t gain = gain_q31(att->w_accel_q24, dt_us);
+    const int64_t sum = x + dx;
+    if (sum == (int32_t)sum) { return (int32_t)sum; }
+    return (sum < 0) ? INT32_MIN : INT32_MAX;
+}
+
+/*
+ * Second-order low-pass of the acceleration a in the world, in state-variable form: tau mean' = slope,
+ * tau slope' = 2 (a - mean - slope), a Butterworth with its corner at sqrt(2) / tau. The world is turned so that the
+ * mean stays vertical, which leaves its length as the state; the rate of that turn is mean' / length.
+ */
+static void low_pass(evs_attitude_t *att, evs_vec3_t a_q18, uint32_t dt_us)
+{
+    evs_vec3_t *const s = &att->slope_q24;
+    const int32_t g_q31 = gain_q31(att->w_accel_q24, dt_us);
+    const int32_t ex_q18 = a_q18.x - (s->x >> 6);
+    const int32_t ey_q18 = a_q18.y - (s->y >> 6);
+    const int32_t ez_q18 = a_q18.z - (s->z >> 6) - (att->gravity_q24 >> 6);
+    s->x = plus_sat(s->x, mac(0, ex_q18, g_q31) >> 24);
+    s->y = plus_sat(s->y, mac(0, ey_q18, g_q31) >> 24);
+    s->z = plus_sat(s->z, mac(0, ez_q18, g_q31) >> 24);
+    att->gravity_q24 = plus_sat(att->gravity_q24, mac(0, s->z, g_q31) >> 31);
+}
+
+/* While settling: the plain mean of all accelerations so far, by a gain of 1 / elapsed time. */
+static void average(evs_attitude_t *att, evs_vec3_t a_q18, uint32_t dt_us)
+{
+    const int32_t g_q31 = gain_q31(att->w_accel_q24, dt_us);
     const int64_t up_q18 = (int64_t)a_q18.z - (att->gravity_q24 >> 6);
-    att->gravity_q24 = evs_sat32(att->gravity_q24 + evs_shr_r64(up_q18 * gain, 25));
+    att->gravity_q24 = plus_sat(att->gravity_q24, (up_q18 * g_q31) >> 25);
     att->slope_q24.x = evs_sat32((int64_t)a_q18.x * 64);
     att->slope_q24.y = evs_sat32((int64_t)a_q18.y * 64);
 
-    att->w_accel_q24 -= evs_q_mul(att->w_accel_q24, gain, 31);
-    if (att->w_accel_q24 <= per_second_q24(att->cfg.tau_accel_ms)) {
-        att->w_accel_q24 = corner_q24(att->cfg.tau_accel_ms);
+    const int32_t final_q24 = per_second_q24(att->cfg.tau_accel_ms);
+    att->w_accel_q24 = relaxed(att->w_accel_q24, final_q24, dt_us, 0u);
+    if (att->w_accel_q24 == final_q24) {
         att->slope_q24.x = 0;
         att->slope_q24.y = 0;
         set_flag(att, EVS_ATTITUDE_SETTLING, false);
@@ -558,26 +613,41 @@ static void settle(evs_attitude_t *att, evs_vec3_t a_q18, uint32_t dt_us)
 }
 
 /*
- * Second-order low-pass of the acceleration in the world, in state-variable form: slope' = w (a - mean - sqrt(2)
- * slope), mean' = w slope. The world is turned so that the mean stays vertical, which leaves its length as the state
- * and makes w slope / length the rate of that turn; the slope, a world vector too, is turned with it.
+ * A lone acceleration far off, while the next one is near gravity, is a glitch: take its part out of the slope again.
+ * Real shocks last, or swing back; and clipped samples must stay in.
  */
-static void filter(evs_attitude_t *att, evs_vec3_t a_q18, uint32_t dt_us)
+static void look_for_shock(evs_attitude_t *att, evs_vec3_t a_q18, uint32_t size_q20, uint32_t dt_us)
 {
-    const evs_vec3_t c_q30 = half_angle_q30(att->correct_q24, dt_us); /* half the turn of this interval */
-    const evs_vec3_t s = att->slope_q24;
-    const int64_t sx = s.x + evs_shr_r64((int64_t)c_q30.y * s.z - (int64_t)c_q30.z * s.y, 29);
-    const int64_t sy = s.y + evs_shr_r64((int64_t)c_q30.z * s.x - (int64_t)c_q30.x * s.z, 29);
-    const int64_t sz = s.z + evs_shr_r64((int64_t)c_q30.x * s.y - (int64_t)c_q30.y * s.x, 29);
+    int16_t *const shock = att->shock_q4;
+    const evs_vec3_t trial_q4 = {shock[0], shock[1], shock[2]};
+    const uint32_t trial = largest(trial_q4);
+    if ((trial == 0u) && (size_q20 <= SHOCK_Q20)) { return; }
 
-    const int32_t h_q31 = gain_q31(att->w_accel_q24, dt_us);
-    const int64_t ex_q18 = a_q18.x - evs_shr_r64((int64_t)s.x * SQRT2_Q30, 36);
-    const int64_t ey_q18 = a_q18.y - evs_shr_r64((int64_t)s.y * SQRT2_Q30, 36);
-    const int64_t ez_q18 = a_q18.z - evs_shr_r64((int64_t)s.z * SQRT2_Q30, 36) - (att->gravity_q24 >> 6);
-    att->slope_q24.x = evs_sat32(sx + evs_shr_r64(ex_q18 * h_q31, 25));
-    att->slope_q24.y = evs_sat32(sy + evs_shr_r64(ey_q18 * h_q31, 25));
-    att->slope_q24.z = evs_sat32(sz + evs_shr_r64(ez_q18 * h_q31, 25));
-    att->gravity_q24 = evs_add_sat(att->gravity_q24, evs_q_mul(att->slope_q24.z, h_q31, 31));
+    const evs_vec3_t off_q4 = {a_q18.x >> 14, a_q18.y >> 14, (a_q18.z >> 14) - (att->gravity_q24 >> 20)};
+    if ((trial != 0u) && (largest(off_q4) <= trial / 4u)) {
+        const int32_t g_q31 = gain_q31(att->w_accel_q24, dt_us);
+        att->slope_q24.x = plus_sat(att->slope_q24.x, -(((int64_t)trial_q4.x * g_q31) >> 10));
+        att->slope_q24.y = plus_sat(att->slope_q24.y, -(((int64_t)trial_q4.y * g_q31) >> 10));
+        att->slope_q24.z = plus_sat(att->slope_q24.z, -(((int64_t)trial_q4.z * g_q31) >> 10));
+        evs_count(&att->faults.n_accel_bad);
+    }
+    const bool lone = (trial == 0u) && (size_q20 > SHOCK_Q20); /* a second one in a row is none */
+    shock[0] = lone ? evs_sat16(off_q4.x) : 0;
+    shock[1] = lone ? evs_sat16(off_q4.y) : 0;
+    shock[2] = lone ? evs_sat16(off_q4.z) : 0;
+}
+
+/* 1 / gravity in Q32: within 2 % of 9.81 m/s^2 by its series to the second order, beyond 25 % by the reciprocal. */
+static int32_t inverse_of(int32_t gravity_q24)
+{
+    const int32_t off_q24 = gravity_q24 - GRAVITY_Q24;
+    if (evs_abs_u32(off_q24) < (uint32_t)GRAVITY_Q24 / 4u) {
+        const int32_t x_q32 = (int32_t)(((int64_t)off_q24 * INT32_C(437964779)) >> 24); /* off / 9.80665, below 1/4 */
+        return INT32_C(437964779) - fraction(INT32_C(437964779), x_q32 - fraction(x_q32, x_q32));
+    }
+    unsigned shift;
+    const uint32_t r = evs_recip_u32((uint32_t)gravity_q24, &shift); /* gravity >= 2^25, so shift >= 57 */
+    return (int32_t)(r >> (shift - 56u));
 }
 
 static void correct_tilt(evs_attitude_t *att)
@@ -588,11 +658,26 @@ static void correct_tilt(evs_attitude_t *att)
         att->correct_q24.y = 0;
         return;
     }
-    unsigned shift;
-    const uint32_t r = evs_recip_u32((uint32_t)att->gravity_q24, &shift);
-    const int64_t w_over_g_q24 = (int64_t)(((uint64_t)(uint32_t)att->w_accel_q24 * r) >> (shift - 24u));
-    att->correct_q24.x = evs_sat32(evs_shr_r64(att->slope_q24.y * w_over_g_q24, 24));
-    att->correct_q24.y = evs_sat32(-evs_shr_r64(att->slope_q24.x * w_over_g_q24, 24));
+    const int32_t k_q24 = fraction(att->w_accel_q24, inverse_of(att->gravity_q24));
+    const int32_t limit = CORRECT_MAX_Q24;
+    att->correct_q24.x = evs_clamp(plus_sat(0, mac(0, att->slope_q24.y, k_q24) >> 24), -limit, limit);
+    att->correct_q24.y = evs_clamp(plus_sat(0, -(mac(0, att->slope_q24.x, k_q24) >> 24)), -limit, limit);
+}
+
+/*
+ * A bias keeps the correction busy: its mean is the bias, seen from the world. That is a poor measure while the carrier
+ * accelerates, so it is only used until the first rest, and by a small part.
+ */
+static void learn_bias_in_motion(evs_attitude_t *att, uint32_t dt_us)
+{
+    evs_vec3_t world_q24 = att->correct_q24;
+    if (has_flag(att, EVS_ATTITUDE_RECOVERING)) { world_q24.z = 0; } /* a heading that still converges tells nothing */
+    const evs_vec3_t c_q24 = evs_quat_rotate(evs_quat_conj(att->q), world_q24);
+    const int32_t gain = (int32_t)(dt_us * BIAS_MOTION_Q31);
+    const int32_t max_q30 = (int32_t)(att->cfg.bias_max_mrad_s * UINT32_C(1073742));
+    att->bias_q30.x = evs_clamp(att->bias_q30.x - evs_q_mul(c_q24.x, gain, 25), -max_q30, max_q30);
+    att->bias_q30.y = evs_clamp(att->bias_q30.y - evs_q_mul(c_q24.y, gain, 25), -max_q30, max_q30);
+    att->bias_q30.z = evs_clamp(att->bias_q30.z - evs_q_mul(c_q24.z, gain, 25), -max_q30, max_q30);
 }
 
 void evs_attitude_push_accel(evs_attitude_t *att, uint32_t t_us, evs_vec3_t accel_m_s2_q20)
@@ -606,45 +691,41 @@ void evs_attitude_push_accel(evs_attitude_t *att, uint32_t t_us, evs_vec3_t acce
         return;
     }
     const bool first = !has_flag(att, SEEN_ACCEL);
-    uint32_t dt_us = advance(att, &att->t_accel_us, &att->n_time_back[1], t_us, SEEN_ACCEL);
+    const uint32_t since_us = advance(att, &att->t_accel_us, &att->n_time_back[1], t_us, SEEN_ACCEL);
     if (first) { att->accel_lp_q20 = accel_m_s2_q20; }
-    if (dt_us > TRIM_STEP_US) { dt_us = TRIM_STEP_US; }
+    if (!first && (since_us == 0u)) { return; }
+    const uint32_t dt_us = min_u32(since_us, TRIM_STEP_US);
 
-    const evs_vec3_t a_q18 = {accel_m_s2_q20.x >> 2, accel_m_s2_q20.y >> 2, accel_m_s2_q20.z >> 2};
+    const evs_vec3_t world_q18 = seen_from_world(att->q, accel_m_s2_q20);
     if (!has_flag(att, EVS_ATTITUDE_TILT_KNOWN) && (att->cfg.mode != EVS_ATTITUDE_GYRO_ONLY)) {
-        start_tilt(att, a_q18);
+        start_tilt(att, world_q18);
+        return;
     }
     if (dt_us == 0u) { return; }
     watch_accel(att, accel_m_s2_q20, dt_us);
     if (att->cfg.mode == EVS_ATTITUDE_FILTER) {
-        const evs_vec3_t world_q18 = evs_quat_rotate(att->q, a_q18);
         if (has_flag(att, EVS_ATTITUDE_SETTLING)) {
-            settle(att, world_q18, dt_us);
+            average(att, world_q18, dt_us);
         } else {
-            filter(att, world_q18, dt_us);
+            look_for_shock(att, world_q18, size_q20, dt_us);
+            low_pass(att, world_q18, dt_us);
+            if (att->cfg.learn_bias && !has_flag(att, EVS_ATTITUDE_BIAS_KNOWN)) { learn_bias_in_motion(att, dt_us); }
         }
         correct_tilt(att);
     } else if (att->cfg.mode == EVS_ATTITUDE_VALENTI) {
-        valenti_accel(att, a_q18, dt_us);
+        const evs_vec3_t a_q18 = {accel_m_s2_q20.x >> 2, accel_m_s2_q20.y >> 2, accel_m_s2_q20.z >> 2};
+        evs_attitude_valenti_accel(att, a_q18, dt_us);
     }
 }
 
-/* ---- magnetometer ---- */
+/* --- magnetometer ---------------------------------------------------------------------------------------------- */
 
-/* Turn the whole estimate about the vertical. */
-static void turn_heading(evs_attitude_t *att, int32_t angle)
-{
-    const evs_quat_t turn = about_vertical(angle);
-    att->q = renormalized(evs_quat_mul(turn, att->q));
-    att->slope_q24 = evs_quat_rotate(turn, att->slope_q24);
-}
-
-/* How far (h, v) lies from a reference, squared, against the squared tolerance. */
+/* Whether (h, v) is the reference, within the tolerance of its size. */
 static bool field_fits(const evs_attitude_t *att, int32_t h_q16, int32_t v_q16, int32_t ref_h_q16, int32_t ref_v_q16)
 {
     const int64_t dh = (int64_t)h_q16 - ref_h_q16;
     const int64_t dv = (int64_t)v_q16 - ref_v_q16;
-    const uint64_t off_q32 = (uint64_t)(dh * dh) + (uint64_t)(dv * dv); /* below 2^60 */
+    const uint64_t off_q32 = (uint64_t)(dh * dh) + (uint64_t)(dv * dv);
     const uint64_t size_q32 = (uint64_t)((int64_t)ref_h_q16 * ref_h_q16) + (uint64_t)((int64_t)ref_v_q16 * ref_v_q16);
     const uint32_t tolerance = att->cfg.mag_tolerance_permille;
     return off_q32 <= (size_q32 >> 20) * ((tolerance * tolerance * 537u) >> 9); /* 10^-6 = 1.0488 / 2^20 */
@@ -652,106 +733,139 @@ static bool field_fits(const evs_attitude_t *att, int32_t h_q16, int32_t v_q16, 
 
 static void track_field(int32_t *h, int32_t *v, int32_t h_q16, int32_t v_q16, uint32_t dt_us)
 {
-    const int32_t gain = (int32_t)(dt_us * 107u); /* Q31 of dt / 20 s */
-    *h += evs_q_mul(h_q16 - *h, gain, 31);
-    *v += evs_q_mul(v_q16 - *v, gain, 31);
+    const int32_t gain_q32 = (int32_t)(dt_us * FIELD_GAIN_Q32);
+    *h += fraction(h_q16 - *h, gain_q32);
+    *v += fraction(v_q16 - *v, gain_q32);
 }
 
-/* Whether the field is as it was; and if not, whether the new one has lasted long enough to be the new normal. */
-static bool field_is_disturbed(evs_attitude_t *att, int32_t h_q16, int32_t v_q16, uint32_t dt_us)
+/* Another field than the undisturbed one: has it lasted long enough to be the new normal? */
+static bool other_field_has_lasted(evs_attitude_t *att, bool known, int32_t h_q16, int32_t v_q16, uint32_t dt_us)
 {
-    const bool known = (att->field_h_q16 != 0) || (att->field_v_q16 != 0);
-    const bool fits = known && field_fits(att, h_q16, v_q16, att->field_h_q16, att->field_v_q16);
-    if (fits) {
-        att->field_ok_us = add_sat_u32(att->field_ok_us, dt_us);
-        if (att->field_ok_us >= FIELD_SETTLE_US) {
-            track_field(&att->field_h_q16, &att->field_v_q16, h_q16, v_q16, dt_us);
-        }
-    } else {
-        att->field_ok_us = 0u;
-    }
-
-    if (field_fits(att, h_q16, v_q16, att->other_h_q16, att->other_v_q16)) {
-        track_field(&att->other_h_q16, &att->other_v_q16, h_q16, v_q16, dt_us);
-        if (largest(att->rate_q24) > (uint32_t)MOTION_MIN_Q24) { att->other_us = add_sat_u32(att->other_us, dt_us); }
-        if (!fits && (!known || (att->other_us >= FIELD_NEW_US))) {
-            att->field_h_q16 = att->other_h_q16;
-            att->field_v_q16 = att->other_v_q16;
-            att->field_ok_us = FIELD_SETTLE_US;
-        }
-    } else {
+    if (!field_fits(att, h_q16, v_q16, att->other_h_q16, att->other_v_q16)) {
         att->other_us = 0u;
         att->other_h_q16 = h_q16;
         att->other_v_q16 = v_q16;
+        return false;
     }
-    return !fits && known;
+    track_field(&att->other_h_q16, &att->other_v_q16, h_q16, v_q16, dt_us);
+    if (!known || (largest(att->rate_q24) > MOTION_MIN_Q24)) { att->other_us = add_sat_u32(att->other_us, dt_us); }
+    return att->other_us >= (known ? FIELD_NEW_US : FIELD_FIRST_US);
+}
+
+/* How much of the heading's gain the field deserves; keeps account of it. */
+static int32_t trusted_gain(evs_attitude_t *att, int32_t h_q16, int32_t v_q16, uint32_t dt_us)
+{
+    const bool known = (att->field_h_q16 | att->field_v_q16) != 0;
+    const bool fits = known && field_fits(att, h_q16, v_q16, att->field_h_q16, att->field_v_q16);
+    set_flag(att, EVS_ATTITUDE_MAG_DISTURBED, known && !fits);
+    if (fits) {
+        att->other_us = 0u;
+        att->field_ok_us += (att->field_ok_us < FIELD_SETTLE_US) ? dt_us : 0u;
+        if (att->field_ok_us >= FIELD_SETTLE_US) {
+            track_field(&att->field_h_q16, &att->field_v_q16, h_q16, v_q16, dt_us);
+            /* trust comes back twice as fast as it went */
+            att->field_bad_us = (att->field_bad_us > 2u * dt_us) ? att->field_bad_us - 2u * dt_us : 0u;
+            return att->w_mag_q24;
+        }
+    } else {
+        att->field_ok_us = 0u;
+        if (other_field_has_lasted(att, known, h_q16, v_q16, dt_us)) {
+            att->field_h_q16 = att->other_h_q16;
+            att->field_v_q16 = att->other_v_q16;
+            att->field_ok_us = FIELD_SETTLE_US;
+            att->other_us = 0u;
+        }
+        if (!known) { return att->w_mag_q24; } /* nothing to compare with yet */
+    }
+    if (att->field_bad_us < FIELD_REJECT_US) {
+        att->field_bad_us += dt_us;
+        return 0;
+    }
+    return att->w_mag_q24 / 2;
+}
+
+/* Angle of the field from north towards east, as a binary angle, and its horizontal part. */
+static int32_t heading_of(evs_vec3_t m_q16, int32_t *h_q16)
+{
+    if ((m_q16.y > 0) && (evs_abs_u32(m_q16.x) < (uint32_t)m_q16.y / 4u)) { /* the usual: a small angle */
+        unsigned shift;
+        const uint32_t r = evs_recip_u32((uint32_t)m_q16.y, &shift);
+        const int32_t t_q32 = (int32_t)(((int64_t)m_q16.x * r) >> (shift - 32u)); /* tangent */
+        const int32_t tt_q32 = fraction(t_q32, t_q32);
+        const int32_t tttt_q32 = fraction(tt_q32, tt_q32);
+        *h_q16 = m_q16.y + fraction(m_q16.y, (tt_q32 >> 1) - (tttt_q32 >> 3)); /* to 2e-5 of it */
+        const int32_t atan_q32 = t_q32 - fraction(t_q32, fraction(tt_q32, INT32_C(1431655765)) -
+                                                             fraction(tttt_q32, INT32_C(858993459))); /* to 1e-5 rad */
+        return fraction(atan_q32, INT32_C(683565276));                                                /* 1 / (2 pi) */
+    }
+    *h_q16 = (int32_t)evs_sqrt_u64((uint64_t)((int64_t)m_q16.x * m_q16.x) + (uint64_t)((int64_t)m_q16.y * m_q16.y));
+    return evs_atan2(m_q16.x, m_q16.y);
 }
 
 static void correct_heading(evs_attitude_t *att, uint32_t dt_us)
 {
-    const evs_vec3_t m = att->mag_lp_q16;
-    const uint64_t hh_q32 = (uint64_t)((int64_t)m.x * m.x) + (uint64_t)((int64_t)m.y * m.y);
-    int32_t gain_q24 = att->w_mag_q24;
-    if (att->cfg.reject_mag) {
-        const bool disturbed = field_is_disturbed(att, (int32_t)evs_sqrt_u64(hh_q32), m.z, dt_us);
-        set_flag(att, EVS_ATTITUDE_MAG_DISTURBED, disturbed);
-        if (att->field_ok_us >= FIELD_SETTLE_US) { /* trust comes back twice as fast as it went */
-            att->field_bad_us = (att->field_bad_us > 2u * dt_us) ? att->field_bad_us - 2u * dt_us : 0u;
-        } else if (att->field_bad_us < FIELD_REJECT_US) {
-            att->field_bad_us += dt_us;
-            gain_q24 = 0;
-        } else {
-            gain_q24 /= 2;
-        }
+    int32_t h_q16;
+    const int32_t heading = heading_of(att->mag_lp_q16, &h_q16);
+    const int32_t off = (int32_t)((uint32_t)heading - (uint32_t)att->cfg.declination);
+    const int32_t gain_q24 = att->cfg.reject_mag ? trusted_gain(att, h_q16, att->mag_lp_q16.z, dt_us) : att->w_mag_q24;
+    const int32_t turns_q24 = fraction_down(off, gain_q24); /* per second; at most 8 / 2 */
+    const int32_t rate_q24 = (int32_t)(((int64_t)turns_q24 * INT32_C(1686629713)) >> 28); /* 2 pi in Q28 */
+    att->correct_q24.z = evs_clamp(rate_q24, -CORRECT_MAX_Q24, CORRECT_MAX_Q24);
+}
+
+/* The first field: turn the whole estimate to north at once. */
+static void start_heading(evs_attitude_t *att, evs_vec3_t world_q16)
+{
+    const int32_t off = (int32_t)((uint32_t)evs_atan2(world_q16.x, world_q16.y) - (uint32_t)att->cfg.declination);
+    const evs_quat_t turn = evs_attitude_about_vertical(off);
+    att->q = evs_attitude_renormalized(evs_quat_mul(turn, att->q));
+    const evs_vec3_t slope_q22 = seen_from_world(turn, att->slope_q24);
+    att->slope_q24.x = evs_sat32((int64_t)slope_q22.x * 4);
+    att->slope_q24.y = evs_sat32((int64_t)slope_q22.y * 4);
+    att->mag_lp_q16 = evs_quat_rotate(turn, world_q16);
+    set_flag(att, EVS_ATTITUDE_HEADING_KNOWN, true);
+    if (att->cfg.mode == EVS_ATTITUDE_FILTER) {
+        att->w_mag_q24 = FIRST_MAG_Q24;
+        set_flag(att, EVS_ATTITUDE_RECOVERING, true);
     }
-    const int32_t off = (int32_t)((uint32_t)evs_atan2(m.x, m.y) - (uint32_t)att->cfg.declination);
-    const int32_t turns_q24 = evs_mul_hi(off, gain_q24);                              /* turns per second */
-    att->correct_q24.z = evs_sat32(evs_shr_r64((int64_t)turns_q24 * 1686629713, 28)); /* 2 pi in Q28 */
 }
 
 void evs_attitude_push_mag(evs_attitude_t *att, uint32_t t_us, evs_vec3_t field_ut_q16)
 {
     EVS_ASSERT(att != NULL);
     const uint32_t size_q16 = largest(field_ut_q16);
-    const bool bad = (size_q16 == 0u) || (size_q16 > UINT32_C(4096) << 16);
+    const uint32_t usual_q16 = (uint32_t)att->field_h_q16 + evs_abs_u32(att->field_v_q16); /* 0: none yet */
+    const bool bad =
+        (size_q16 == 0u) || (size_q16 > FIELD_MAX_Q16) || ((usual_q16 != 0u) && (size_q16 / 4u > usual_q16));
     set_flag(att, EVS_ATTITUDE_MAG_BAD, bad);
     if (bad) {
         evs_count(&att->faults.n_mag_bad);
         return;
     }
-    uint32_t dt_us = advance(att, &att->t_mag_us, &att->n_time_back[2], t_us, SEEN_MAG);
-    if (dt_us > TRIM_STEP_US) { dt_us = TRIM_STEP_US; }
+    const bool first = !has_flag(att, SEEN_MAG);
+    const uint32_t since_us = advance(att, &att->t_mag_us, &att->n_time_back[2], t_us, SEEN_MAG);
+    if (!first && (since_us == 0u)) { return; }
     if ((att->cfg.mode == EVS_ATTITUDE_GYRO_ONLY) || !has_flag(att, EVS_ATTITUDE_TILT_KNOWN)) { return; }
 
-    const evs_vec3_t world_q16 = evs_quat_rotate(att->q, field_ut_q16);
+    const uint32_t dt_us = min_u32(since_us, TRIM_STEP_US);
+    const evs_vec3_t field_q18 = {field_ut_q16.x * 4, field_ut_q16.y * 4, field_ut_q16.z * 4};
+    const evs_vec3_t world_q16 = seen_from_world(att->q, field_q18);
     if (!has_flag(att, EVS_ATTITUDE_HEADING_KNOWN)) {
-        turn_heading(att, (int32_t)((uint32_t)evs_atan2(world_q16.x, world_q16.y) - (uint32_t)att->cfg.declination));
-        att->mag_lp_q16 = evs_quat_rotate(att->q, field_ut_q16);
-        att->field_bad_us = FIELD_REJECT_US; /* nothing to compare with yet: half a gain rather than none */
-        set_flag(att, EVS_ATTITUDE_HEADING_KNOWN, true);
-        if (att->cfg.mode == EVS_ATTITUDE_FILTER) {
-            att->w_mag_q24 = GAIN_MAX_Q24 / 16; /* 8 1/s: relaxes from there */
-            set_flag(att, EVS_ATTITUDE_RECOVERING, true);
-        }
-        return;
-    }
-    if ((att->mag_lp_q16.x | att->mag_lp_q16.y | att->mag_lp_q16.z) == 0) { /* the orientation was given */
+        start_heading(att, world_q16);
+    } else if (att->cfg.mode == EVS_ATTITUDE_VALENTI) {
+        evs_attitude_valenti_mag(att, world_q16, dt_us);
+    } else if ((att->mag_lp_q16.x | att->mag_lp_q16.y | att->mag_lp_q16.z) == 0) { /* the orientation was given */
         att->mag_lp_q16 = world_q16;
-        att->field_bad_us = FIELD_REJECT_US;
+    } else {
+        const int32_t gain_q32 = (int32_t)(dt_us * MAG_GAIN_Q32);
+        (void)follow(&att->mag_lp_q16.x, world_q16.x, gain_q32);
+        (void)follow(&att->mag_lp_q16.y, world_q16.y, gain_q32);
+        (void)follow(&att->mag_lp_q16.z, world_q16.z, gain_q32);
+        correct_heading(att, dt_us);
     }
-    if (dt_us == 0u) { return; }
-    if (att->cfg.mode == EVS_ATTITUDE_VALENTI) {
-        valenti_mag(att, world_q16, dt_us);
-        return;
-    }
-    const int32_t gain = (int32_t)(dt_us * 10737u); /* Q31 of dt / 0.2 s: at most one half */
-    att->mag_lp_q16.x += evs_q_mul(world_q16.x - att->mag_lp_q16.x, gain, 31);
-    att->mag_lp_q16.y += evs_q_mul(world_q16.y - att->mag_lp_q16.y, gain, 31);
-    att->mag_lp_q16.z += evs_q_mul(world_q16.z - att->mag_lp_q16.z, gain, 31);
-    correct_heading(att, dt_us);
 }
 
-/* ---- set up, and the rest of the interface ---- */
+/* --- set up, and the rest of the interface ---------------------------------------------------------------------- */
 
 evs_attitude_config_t evs_attitude_config_default(void)
 {
@@ -799,11 +913,11 @@ void evs_attitude_reset(evs_attitude_t *att)
     EVS_ASSERT(att != NULL);
     const evs_attitude_config_t cfg = att->cfg;
     *att = (evs_attitude_t){.cfg = cfg,
+                            .flags = MOVING, /* so that the running means start with the first sample */
                             .q = evs_quat_identity(),
                             .gravity_q24 = GRAVITY_Q24,
-                            .w_accel_q24 = corner_q24(cfg.tau_accel_ms),
-                            .w_mag_q24 = per_second_q24(cfg.tau_mag_ms),
-                            .bias_gain_q24 = BIAS_GAIN_0_Q24};
+                            .w_accel_q24 = per_second_q24(cfg.tau_accel_ms),
+                            .w_mag_q24 = per_second_q24(cfg.tau_mag_ms)};
 }
 
 evs_status_t evs_attitude_set_orientation(evs_attitude_t *att, evs_quat_t q_wi)
@@ -816,9 +930,10 @@ evs_status_t evs_attitude_set_orientation(evs_attitude_t *att, evs_quat_t q_wi)
     att->slope_q24 = (evs_vec3_t){0, 0, 0};
     att->mag_lp_q16 = (evs_vec3_t){0, 0, 0};
     att->gravity_q24 = GRAVITY_Q24;
-    att->w_accel_q24 = corner_q24(att->cfg.tau_accel_ms);
+    att->w_accel_q24 = per_second_q24(att->cfg.tau_accel_ms);
     att->w_mag_q24 = per_second_q24(att->cfg.tau_mag_ms);
     set_flag(att, EVS_ATTITUDE_SETTLING | EVS_ATTITUDE_RECOVERING, false);
+    att->field_bad_us = 0u;
     set_flag(att, EVS_ATTITUDE_TILT_KNOWN | EVS_ATTITUDE_HEADING_KNOWN, true);
     return EVS_OK;
 }

@@ -463,28 +463,109 @@ static void test_bad_samples_are_counted_by_cause(void)
     TEST_ASSERT_FALSE(flag(EVS_ATTITUDE_MAG_BAD));
 }
 
-static void test_clipped_gyro_is_flagged_with_the_limit_given_or_found(void)
+static void test_lone_gyro_spike_is_taken_back_by_the_next_sample(void)
 {
-    for (int given = 0; given < 2; given++) {
-        evs_attitude_config_t cfg = evs_attitude_config_default();
-        if (given != 0) { cfg.gyro_limit_rad_s_q24 = to_q(8.7, 24); }
-        start(&cfg);
+    static const double SPIKES[][3] = {{35.0, -35.0, 35.0}, {0.0, 128.0, 0.0}, {-128.0, -128.0, 127.0}};
+    for (size_t k = 0; k < sizeof SPIKES / sizeof SPIKES[0]; k++) {
+        start(NULL);
         quat_d truth = quat(1.0, 0.0, 0.0, 0.0);
-        rest_for(5.0, truth, 0.0, false);
-        for (int i = 0; i < 200; i++) { /* 1 s at up to 12 rad/s, clipped at 8.7 */
-            const double rate = 12.0 * sin(i * STEP_US * 1e-6 * PI);
-            const double dt = STEP_US * 1e-6;
-            truth = mul_d(truth, turn_d(0.0, rate * dt, 0.0));
-            now_us += STEP_US;
-            evs_attitude_push_gyro(&att, now_us, vec(0.0, fmin(rate, 8.7), 0.0, 24));
-            evs_attitude_push_accel(&att, now_us, seen(truth, 0.0, 0.0, G, 20));
-            if (i == 100) { TEST_ASSERT_TRUE(flag(EVS_ATTITUDE_GYRO_SATURATED)); }
-        }
-        TEST_ASSERT_TRUE(evs_attitude_faults(&att).n_gyro_saturated > 60u);
-        TEST_ASSERT_TRUE(tilt_error_deg(truth) > 10.0);
-        rest_for(4.0, truth, 0.0, false);
-        TEST_ASSERT_TRUE(tilt_error_deg(truth) < 1.0); /* with the unshortened 3 s it would still be off by more */
+        for (int i = 0; i < 2000; i++) { truth = step(truth, 0.3, -0.2, 1.0, false); }
+        const double before = error_deg(truth);
+        now_us += STEP_US;
+        evs_attitude_push_gyro(&att, now_us, vec(SPIKES[k][0], SPIKES[k][1], SPIKES[k][2], 24));
+        truth = mul_d(truth, turn_d(0.3 * 0.005, -0.2 * 0.005, 1.0 * 0.005));
+        TEST_ASSERT_TRUE(error_deg(truth) > 10.0);
+        truth = step(truth, 0.3, -0.2, 1.0, false);
+        TEST_ASSERT_TRUE(error_deg(truth) < before + 0.01);
+        TEST_ASSERT_EQUAL_UINT32(1u, evs_attitude_faults(&att).n_gyro_spikes);
     }
+}
+
+static void test_sudden_turn_that_lasts_is_no_spike(void)
+{
+    quat_d truth = quat(1.0, 0.0, 0.0, 0.0);
+    rest_for(2.0, truth, 0.0, false);
+    for (int i = 0; i < 20; i++) { truth = step(truth, 0.0, 0.0, 20.0, false); }
+    for (int i = 0; i < 20; i++) { truth = step(truth, 0.0, 0.0, 0.0, false); }
+    TEST_ASSERT_EQUAL_UINT32(0u, evs_attitude_faults(&att).n_gyro_spikes);
+    TEST_ASSERT_TRUE(error_deg(truth) < 0.01);
+}
+
+/* A lone shock is a glitch; one that swings back, as an impact does, is left in and balances. */
+static void test_lone_acceleration_spike_is_taken_back_and_an_impact_is_not(void)
+{
+    const quat_d truth = quat(1.0, 0.0, 0.0, 0.0);
+    double worst[2] = {0.0, 0.0};
+    for (int impact = 0; impact < 2; impact++) {
+        start(NULL);
+        rest_for(8.0, truth, 0.0, false);
+        for (int i = 0; i < 2 + impact; i++) {
+            static const double SHOCK[] = {150.0, -150.0, 0.0};
+            now_us += STEP_US;
+            evs_attitude_push_gyro(&att, now_us, vec(0.0, 0.0, 0.0, 24));
+            evs_attitude_push_accel(&att, now_us, vec((impact != 0) ? SHOCK[i] : 150.0 * (i == 0), 0.0, G, 20));
+        }
+        TEST_ASSERT_EQUAL_UINT32((impact != 0) ? 0u : 1u, evs_attitude_faults(&att).n_accel_bad);
+        for (int i = 0; i < 1000; i++) {
+            rest_for(0.005, truth, 0.0, false);
+            worst[impact] = fmax(worst[impact], tilt_error_deg(truth));
+        }
+        TEST_ASSERT_TRUE(worst[impact] < 0.03); /* 0.9 deg if nothing were done */
+    }
+}
+
+static void test_sensor_that_falls_silent_stops_correcting(void)
+{
+    const quat_d truth = quat(1.0, 0.0, 0.0, 0.0);
+    rest_for(30.0, truth, 0.0, true);
+    for (int i = 0; i < 40; i++) { /* both point elsewhere, then stop */
+        now_us += STEP_US;
+        evs_attitude_push_gyro(&att, now_us, vec(0.0, 0.0, 0.0, 24));
+        evs_attitude_push_accel(&att, now_us, vec(5.0, 0.0, G, 20));
+        evs_attitude_push_mag(&att, now_us, vec(3.0, FIELD_H, FIELD_V, 16));
+    }
+    double after = 0.0;
+    for (int i = 0; i < 12000; i++) {
+        now_us += STEP_US;
+        evs_attitude_push_gyro(&att, now_us, vec(0.0, 0.0, 0.0, 24));
+        if (i == 200) { after = error_deg(truth); }
+    }
+    TEST_ASSERT_TRUE(after > 0.5);
+    TEST_ASSERT_DOUBLE_WITHIN(0.001, after, error_deg(truth));
+}
+
+/* 1 s at up to 12 rad/s, clipped at 8.7, then 4 s of rest: the tilt that is left. */
+static double tilt_left_after_clipping(const evs_attitude_config_t *cfg)
+{
+    start(cfg);
+    quat_d truth = quat(1.0, 0.0, 0.0, 0.0);
+    rest_for(5.0, truth, 0.0, false);
+    for (int i = 0; i < 200; i++) {
+        const double dt = STEP_US * 1e-6;
+        const double rate = 12.0 * sin(i * dt * PI);
+        truth = mul_d(truth, turn_d(0.0, rate * dt, 0.0));
+        now_us += STEP_US;
+        evs_attitude_push_gyro(&att, now_us, vec(0.0, fmin(rate, 8.7), 0.0, 24));
+        evs_attitude_push_accel(&att, now_us, seen(truth, 0.0, 0.0, G, 20));
+        if (i == 100) { TEST_ASSERT_TRUE(flag(EVS_ATTITUDE_GYRO_SATURATED)); }
+    }
+    TEST_ASSERT_TRUE(evs_attitude_faults(&att).n_gyro_saturated > 60u);
+    TEST_ASSERT_TRUE(tilt_error_deg(truth) > 10.0);
+    rest_for(4.0, truth, 0.0, false);
+    return tilt_error_deg(truth);
+}
+
+static void test_clipped_gyro_is_recovered_from_with_the_limit_given_or_found(void)
+{
+    evs_attitude_config_t cfg = evs_attitude_config_default();
+    const double found = tilt_left_after_clipping(&cfg);
+    cfg.gyro_limit_rad_s_q24 = to_q(8.7, 24);
+    const double given = tilt_left_after_clipping(&cfg);
+    cfg.tau_recover_ms = cfg.tau_accel_ms; /* as if it were not noticed */
+    const double unaware = tilt_left_after_clipping(&cfg);
+    TEST_ASSERT_TRUE(unaware > 5.0);
+    TEST_ASSERT_TRUE(found < unaware / 3.0);
+    TEST_ASSERT_TRUE(given < unaware / 3.0);
 }
 
 static void test_disturbed_field_is_flagged_and_not_followed(void)
@@ -502,6 +583,84 @@ static void test_disturbed_field_is_flagged_and_not_followed(void)
     TEST_ASSERT_TRUE(error_deg(truth) < 0.5);
     rest_for(2.0, truth, 0.0, true);
     TEST_ASSERT_FALSE(flag(EVS_ATTITUDE_MAG_DISTURBED));
+}
+
+static void test_field_that_stays_changed_becomes_the_new_normal(void)
+{
+    quat_d truth = quat(1.0, 0.0, 0.0, 0.0);
+    rest_for(70.0, truth, 0.0, true);
+    for (int i = 0; i < 10000; i++) { /* 50 s elsewhere, turning to and fro: a weaker field, still north */
+        const double rate = (i % 400 < 200) ? 0.8 : -0.8;
+        truth = mul_d(truth, turn_d(0.0, 0.0, rate * 0.005));
+        now_us += STEP_US;
+        evs_attitude_push_gyro(&att, now_us, vec(0.0, 0.0, rate, 24));
+        evs_attitude_push_accel(&att, now_us, vec(0.0, 0.0, G, 20));
+        evs_attitude_push_mag(&att, now_us, seen(truth, 0.0, 0.6 * FIELD_H, 0.6 * FIELD_V, 16));
+        if (i == 1000) { TEST_ASSERT_TRUE(flag(EVS_ATTITUDE_MAG_DISTURBED)); }
+    }
+    TEST_ASSERT_FALSE(flag(EVS_ATTITUDE_MAG_DISTURBED));
+    TEST_ASSERT_TRUE(error_deg(truth) < 0.2);
+}
+
+/* --- rates and intervals --------------------------------------------------------------------------------------- */
+
+/* The carrier swings about all axes and surges; its motion is known in closed form. */
+static double swing(double t, int axis, double *rate_d)
+{
+    static const double AMPLITUDE[] = {0.5, 0.4, 0.7};
+    static const double OMEGA[] = {3.1, 4.3, 2.3};
+    *rate_d = AMPLITUDE[axis] * OMEGA[axis] * cos(OMEGA[axis] * t);
+    return AMPLITUDE[axis] * sin(OMEGA[axis] * t);
+}
+/* Orientation z y x, and body rates. */
+static quat_d flight(double t, double w[3])
+{
+    double rd, pd, yd;
+    const double r = swing(t, 0, &rd), p = swing(t, 1, &pd), y = swing(t, 2, &yd);
+    w[0] = rd - yd * sin(p);
+    w[1] = pd * cos(r) + yd * sin(r) * cos(p);
+    w[2] = -pd * sin(r) + yd * cos(r) * cos(p);
+    return mul_d(mul_d(turn_d(0.0, 0.0, y), turn_d(0.0, p, 0.0)), turn_d(r, 0.0, 0.0));
+}
+/* Mean rate between two times, as an IMU that filters before it samples gives it: the rotation over the time. */
+static evs_vec3_t mean_rate(double t0, double t1, int n_bits)
+{
+    double w[3];
+    const quat_d d = mul_d(conj_d(flight(t0, w)), flight(t1, w));
+    const double s = sqrt(d.x * d.x + d.y * d.y + d.z * d.z);
+    const double k = (s > 0.0) ? 2.0 * atan2(s, d.w) / s : 2.0;
+    return vec(k * d.x / (t1 - t0), k * d.y / (t1 - t0), k * d.z / (t1 - t0), n_bits);
+}
+
+static void test_rates_may_differ_between_sensors_and_change_within_one(void)
+{
+    /* gyro interval us, accelerometer and magnetometer every so many gyro samples; 0: random in [100, 20000] */
+    static const int CASES[][3] = {{5000, 1, 1},  {1000, 10, 20}, {100, 10, 100},
+                                   {20000, 1, 1}, {5000, 3, 7},   {0, 1, 1}};
+    for (size_t c = 0; c < sizeof CASES / sizeof CASES[0]; c++) {
+        start(NULL);
+        double w[3], t = 0.0, worst = 0.0;
+        uint32_t random = 1u;
+        const uint32_t t0_us = now_us;
+        evs_attitude_push_gyro(&att, now_us, vec(0.0, 0.0, 0.0, 24));
+        for (int i = 0; t < 20.0; i++) {
+            random = random * 1664525u + 1013904223u;
+            const uint32_t dt_us = (CASES[c][0] != 0) ? (uint32_t)CASES[c][0] : 100u + (random >> 16) % 19901u;
+            const double t_before = t;
+            now_us += dt_us;
+            t = (now_us - t0_us) * 1e-6;
+            const quat_d truth = flight(t, w);
+            const double surge = 3.0 * sin(7.0 * t);
+            evs_attitude_push_gyro(&att, now_us, mean_rate(t_before, t, 24));
+            if (i % CASES[c][1] == 0) { evs_attitude_push_accel(&att, now_us, seen(truth, surge, 0.0, G, 20)); }
+            if (i % CASES[c][2] == 0) { evs_attitude_push_mag(&att, now_us, seen(truth, 0.0, FIELD_H, FIELD_V, 16)); }
+            if (t > 10.0) { worst = fmax(worst, error_deg(truth)); }
+        }
+        char what[32];
+        (void)snprintf(what, sizeof what, "case %u", (unsigned)c);
+        TEST_ASSERT_DOUBLE_WITHIN_MESSAGE((CASES[c][0] != 0) ? 1.0 : 1.6, 0.0, worst, what);
+        TEST_ASSERT_EQUAL_UINT32(0u, evs_attitude_faults(&att).n_time_bad);
+    }
 }
 
 /* --- the other modes ------------------------------------------------------------------------------------------- */
@@ -556,8 +715,14 @@ int main(void)
     RUN_TEST(test_bias_can_be_saved_and_restored);
     RUN_TEST(test_one_bad_sample_does_no_lasting_harm);
     RUN_TEST(test_bad_samples_are_counted_by_cause);
-    RUN_TEST(test_clipped_gyro_is_flagged_with_the_limit_given_or_found);
+    RUN_TEST(test_lone_gyro_spike_is_taken_back_by_the_next_sample);
+    RUN_TEST(test_sudden_turn_that_lasts_is_no_spike);
+    RUN_TEST(test_lone_acceleration_spike_is_taken_back_and_an_impact_is_not);
+    RUN_TEST(test_sensor_that_falls_silent_stops_correcting);
+    RUN_TEST(test_clipped_gyro_is_recovered_from_with_the_limit_given_or_found);
     RUN_TEST(test_disturbed_field_is_flagged_and_not_followed);
+    RUN_TEST(test_field_that_stays_changed_becomes_the_new_normal);
+    RUN_TEST(test_rates_may_differ_between_sensors_and_change_within_one);
     RUN_TEST(test_valenti_mode_converges_from_any_start_with_its_time_constant);
     RUN_TEST(test_valenti_mode_learns_bias_in_steady_state);
     return UNITY_END();

@@ -42,6 +42,8 @@
 extern "C" {
 #endif
 
+#define EVS_ATTITUDE_DELTA_MAX_US 20000u /**< Longest increment of evs_attitude_push_delta_angle(). */
+
 /** Which filter. */
 typedef enum {
     EVS_ATTITUDE_FILTER = 0,    /**< The one described above. */
@@ -104,39 +106,40 @@ typedef struct {
     uint32_t n_gyro_saturated; /**< Clipped: used, and followed by quicker correction. */
     uint32_t n_gyro_spikes;    /**< One sample far off both neighbours: taken back when the next one arrived. */
     uint32_t n_gyro_gaps;      /**< Pauses longer than gap_max_ms. */
-    uint32_t n_accel_bad;      /**< Zero, or above accel_max_m_s2: left out. */
-    uint32_t n_mag_bad;        /**< Zero, or above 4096 uT: left out. */
+    uint32_t n_accel_bad;      /**< Zero, above accel_max_m_s2, or one sample far off gravity between ones near it:
+                                    left out, the latter taken back when the next one arrived. */
+    uint32_t n_mag_bad;        /**< Zero, above 4096 uT, or four times the usual field: left out. */
     uint32_t n_time_bad;       /**< Time did not advance within its sensor: left out. */
 } evs_attitude_faults_t;
 
 /** Context. A complete type only so that you can place it: every member is private. */
 typedef struct {
     evs_attitude_config_t cfg;
-    evs_quat_t q;                     /* world from IMU */
-    evs_vec3_t bias_q30;              /* rad/s */
-    evs_vec3_t rate_q24;              /* newest rate less bias */
-    evs_vec3_t correct_q24;           /* rate of correction, world frame, rad/s */
-    evs_vec3_t slope_q24;             /* second state of the acceleration's low-pass, world frame, m/s^2 */
-    int32_t gravity_q24;              /* first state: its x and y are zero by construction, m/s^2 */
-    int32_t w_accel_q24;              /* corner of the low-pass, 1/s; while settling 1 / elapsed time */
-    int32_t w_mag_q24;                /* gain of the heading, 1/s */
-    evs_vec3_t gyro_lp_q28;           /* running mean of the raw rate, rad/s */
-    evs_vec3_t accel_lp_q20;          /* running mean of the raw acceleration, IMU frame, m/s^2 */
-    int16_t accel_ref_q7[3];          /* where it was when stillness began */
-    int16_t rate_before_q8[3];        /* the rate before the newest one, rad/s */
-    evs_vec3_t mag_lp_q16;            /* field, world frame, uT */
+    evs_quat_t q;            /* world from IMU */
+    evs_vec3_t bias_q30;     /* rad/s */
+    evs_vec3_t rate_q24;     /* newest rate less bias, rad/s */
+    evs_vec3_t correct_q24;  /* rate of correction, world frame, rad/s */
+    evs_vec3_t slope_q24;    /* second state of the acceleration's low-pass: tau times the slope, world, m/s^2 */
+    int32_t gravity_q24;     /* first state: its x and y are zero by construction, m/s^2 */
+    int32_t w_accel_q24;     /* 1 / tau of the low-pass; while settling 1 / elapsed time; 1/s */
+    int32_t w_mag_q24;       /* 1 / tau of the heading, 1/s */
+    evs_vec3_t gyro_lp_q24;  /* running mean of the raw rate, rad/s */
+    evs_vec3_t accel_lp_q20; /* running mean of the raw acceleration, IMU frame, m/s^2 */
+    evs_vec3_t mag_lp_q16;   /* running mean of the field, world frame, uT; 0 0 0 = none yet */
     int32_t field_h_q16, field_v_q16; /* the undisturbed field: horizontal, vertical, uT; 0 0 = none yet */
     int32_t other_h_q16, other_v_q16; /* a candidate to replace it */
-    int32_t gyro_max_q24;             /* largest rate seen */
-    int32_t bias_gain_q24;            /* 1/s */
+    uint32_t gyro_max_q24;            /* largest rate seen, rad/s */
     int32_t bias_step_q31;            /* how far the bias may have moved since it was learnt, rad/s */
     uint32_t t_gyro_us, t_accel_us, t_mag_us;
-    uint32_t dt_gyro_us;   /* usual interval */
-    uint32_t dt_newest_us; /* what the newest rate was applied for */
-    uint32_t rest_us;      /* stillness so far */
+    uint32_t rest_us; /* stillness so far */
     uint32_t field_ok_us, field_bad_us, other_us;
     evs_attitude_faults_t faults;
-    uint16_t flags;
+    uint32_t flags;
+    uint16_t dt_gyro_us;       /* usual interval */
+    uint16_t dt_newest_us;     /* what the newest rate was applied for */
+    int16_t accel_ref_q7[3];   /* where the mean acceleration was when stillness began, m/s^2 */
+    int16_t rate_before_q8[3]; /* the rate before one that jumped, rad/s */
+    int16_t shock_q4[3];       /* an acceleration on trial, less gravity, m/s^2; 0 0 0 = none */
     uint8_t n_repeats;
     uint8_t n_time_back[3]; /* in a row: gyro, accelerometer, magnetometer */
 } evs_attitude_t;
@@ -167,7 +170,7 @@ void evs_attitude_push_gyro(evs_attitude_t *att, uint32_t t_us, evs_vec3_t rate_
 /**
  * The same for IMUs that integrate themselves: the rotation from @p t_us - @p dt_us to @p t_us.
  * @param angle_rad_q30  Rotation vector. Integrals of each axis do as well while the axis moves little in between.
- * @param dt_us          [1, 1000000]; else the sample is counted as one of bad time.
+ * @param dt_us          [1, EVS_ATTITUDE_DELTA_MAX_US]; else the sample is counted as one of bad time.
  */
 void evs_attitude_push_delta_angle(evs_attitude_t *att, uint32_t t_us, evs_vec3_t angle_rad_q30, uint32_t dt_us);
 
