@@ -12,6 +12,8 @@ set(EVS_SOURCES
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_fixed.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_homography.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_homography_avx2.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_homography_dsp.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_homography_mve.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_orientation_track.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_pipeline.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_stabilize.c

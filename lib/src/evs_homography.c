@@ -149,8 +149,12 @@ void evs_homography_map(const evs_homography_t *h, const evs_point_t *in, size_t
         return;
     }
     size_t done = 0u;
-#if EVS_HOMOGRAPHY_HAS_AVX2
+#if EVS_SIMD_X86
     if (__builtin_cpu_supports("avx2")) { done = evs_homography_map_avx2(h, in, n, out); }
+#elif EVS_SIMD_MVE
+    done = evs_homography_map_mve(h, in, n, out);
+#elif EVS_SIMD_DSP
+    done = evs_homography_map_dsp(h, in, n, out);
 #endif
     for (size_t i = done; i < n; i++) { out[i] = map_fast(h, in[i]); }
 }

@@ -2,7 +2,7 @@
  * SPDX-FileCopyrightText: 2026 the evstab authors */
 #include "evs_homography_kernel.h"
 
-#if EVS_HOMOGRAPHY_HAS_AVX2
+#if EVS_SIMD_X86
 
 #include <immintrin.h>
 
