@@ -20,6 +20,7 @@ set(EVS_SOURCES
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_tiles.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_types.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_undistort.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_undistort_mve.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_vec.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_wide.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_window.c

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
  * SPDX-FileCopyrightText: 2026 the evstab authors */
-#include "evs/undistort.h"
+#include "evs_undistort_kernel.h"
 
 #include <string.h>
 
@@ -215,9 +215,11 @@ evs_status_t evs_undistort_build(evs_undistort_t *u, const evs_camera_t *cam, ui
 /* ---- The hot path ---- */
 
 #if defined(__GNUC__)
-#define LIKELY(c) __builtin_expect((c), 1) /* keeps the common path of a loop in one piece */
+#define LIKELY(c)     __builtin_expect((c), 1) /* keeps the common path of a loop in one piece */
+#define ALWAYS_INLINE inline __attribute__((always_inline))
 #else
-#define LIKELY(c) (c)
+#define LIKELY(c)     (c)
+#define ALWAYS_INLINE inline
 #endif
 
 /* Interpolation works with 32 parts of a cell whatever its step: a constant number costs no register. */
@@ -248,8 +250,7 @@ static inline lattice_t lattice_of(const evs_undistort_t *u)
     return g;
 }
 
-#if !EVS_NO_SIMD && defined(__ARM_FEATURE_DSP) && defined(__ARM_FEATURE_SIMD32) && defined(__ARMEL__) &&               \
-    defined(__GNUC__)
+#if EVS_SIMD_DSP
 /* Cores with the DSP extension work on both halves of a word at once. The plain C below is what this computes. */
 
 typedef uint32_t pixel_t; /* x in the low half, y in the high half */
@@ -274,11 +275,12 @@ static inline sensor_t sensor_of(const evs_undistort_t *u)
     return s;
 }
 
-static inline bool is_on(sensor_t s, pixel_t p)
+/* By how much each half exceeds the last pixel's; 0 on the sensor. */
+static inline uint32_t excess(sensor_t s, pixel_t p)
 {
-    uint32_t beyond; /* by how much each half exceeds the last pixel's, or 0 */
+    uint32_t beyond;
     __asm__("uqsub16 %0, %1, %2" : "=r"(beyond) : "r"(p), "r"(s.last));
-    return beyond == 0u;
+    return beyond;
 }
 
 static inline uint32_t dual_mul(uint32_t a, uint32_t b) /* low * low + high * high, signed */
@@ -353,7 +355,10 @@ static inline sensor_t sensor_of(const evs_undistort_t *u)
     return s;
 }
 
-static inline bool is_on(sensor_t s, pixel_t p) { return (p.x_px < s.width_px) && (p.y_px < s.height_px); }
+static inline uint32_t excess(sensor_t s, pixel_t p)
+{
+    return ((p.x_px < s.width_px) && (p.y_px < s.height_px)) ? 0u : 1u;
+}
 
 static inline uint32_t index_of(sensor_t s, pixel_t p) { return p.y_px * s.width_px + p.x_px; }
 
@@ -371,6 +376,8 @@ static inline void blend(const evs_point_t *pair, uint32_t left, uint32_t right,
     *y = pair[0].y_q4 * (int32_t)left + pair[1].y_q4 * (int32_t)right;
 }
 #endif
+
+static inline bool is_on(sensor_t s, pixel_t p) { return excess(s, p) == 0u; }
 
 static inline bool has_gap(const evs_point_t *upper, const evs_point_t *lower)
 {
@@ -414,42 +421,101 @@ static void count_rejected(evs_undistort_t *u, size_t n)
     u->n_rejected = (n < room) ? u->n_rejected + (uint32_t)n : UINT32_MAX;
 }
 
-static void map_exact(evs_undistort_t *u, const evs_event_t *ev, size_t n, evs_point_t *points)
+/* A full table, and a full table of tiles or NULL. By value: registers, whatever the outputs might alias. */
+typedef struct {
+    const evs_point_t *points;
+    const uint16_t *tiles;
+    sensor_t sensor;
+} tables_t;
+
+static inline tables_t tables_of(const evs_undistort_t *u)
 {
-    const evs_point_t *const table = u->points;
-    const sensor_t sensor = sensor_of(u);
+    const tables_t t = {u->points, u->tiles, sensor_of(u)};
+    return t;
+}
+
+/* One event; false when it lies off the sensor. `tile` may be NULL. */
+static ALWAYS_INLINE bool look_up(tables_t t, const evs_event_t *ev, evs_point_t *point, uint16_t *tile)
+{
+    const pixel_t pixel = pixel_of(ev);
+    if (!LIKELY(is_on(t.sensor, pixel))) {
+        *point = evs_point_outside();
+        if (tile != NULL) { *tile = EVS_TILE_NONE; }
+        return false;
+    }
+    const uint32_t at = index_of(t.sensor, pixel);
+    *point = t.points[at];
+    if (tile != NULL) { *tile = t.tiles[at]; }
+    return true;
+}
+
+void evs_undistort_map_plain(evs_undistort_t *u, const evs_event_t *ev, size_t n, evs_point_t *points, uint16_t *tiles)
+{
+    const tables_t t = tables_of(u);
     size_t n_off = 0u;
-    for (size_t i = 0u; i < n; i++) {
-        const pixel_t pixel = pixel_of(&ev[i]);
-        if (LIKELY(is_on(sensor, pixel))) {
-            points[i] = table[index_of(sensor, pixel)];
-        } else {
-            points[i] = evs_point_outside();
-            n_off++;
-        }
+    if (tiles == NULL) {
+        for (size_t i = 0u; i < n; i++) { n_off += look_up(t, &ev[i], &points[i], NULL) ? 0u : 1u; }
+    } else {
+        for (size_t i = 0u; i < n; i++) { n_off += look_up(t, &ev[i], &points[i], &tiles[i]) ? 0u : 1u; }
     }
     count_rejected(u, n_off);
 }
 
-static void map_exact_tiles(evs_undistort_t *u, const evs_event_t *ev, size_t n, evs_point_t *points, uint16_t *tiles)
+#if EVS_SIMD_DSP && !EVS_SIMD_MVE
+/* Four events with one branch: false, and nothing written, when some lie off the sensor. */
+static ALWAYS_INLINE bool look_up_four(tables_t t, const evs_event_t *ev, evs_point_t *points, uint16_t *tiles)
 {
-    const evs_point_t *const point_table = u->points;
-    const uint16_t *const tile_table = u->tiles;
-    const sensor_t sensor = sensor_of(u);
-    size_t n_off = 0u;
-    for (size_t i = 0u; i < n; i++) {
-        const pixel_t pixel = pixel_of(&ev[i]);
-        if (LIKELY(is_on(sensor, pixel))) {
-            const uint32_t at = index_of(sensor, pixel);
-            points[i] = point_table[at];
-            tiles[i] = tile_table[at];
-        } else {
-            points[i] = evs_point_outside();
-            tiles[i] = EVS_TILE_NONE;
-            n_off++;
+    const pixel_t p0 = pixel_of(&ev[0]), p1 = pixel_of(&ev[1]), p2 = pixel_of(&ev[2]), p3 = pixel_of(&ev[3]);
+    const uint32_t beyond = excess(t.sensor, p0) | excess(t.sensor, p1) | excess(t.sensor, p2) | excess(t.sensor, p3);
+    if (!LIKELY(beyond == 0u)) { return false; }
+    const uint32_t at0 = index_of(t.sensor, p0), at1 = index_of(t.sensor, p1);
+    const uint32_t at2 = index_of(t.sensor, p2), at3 = index_of(t.sensor, p3);
+    points[0] = t.points[at0];
+    points[1] = t.points[at1];
+    points[2] = t.points[at2];
+    points[3] = t.points[at3];
+    if (tiles != NULL) {
+        tiles[0] = t.tiles[at0];
+        tiles[1] = t.tiles[at1];
+        tiles[2] = t.tiles[at2];
+        tiles[3] = t.tiles[at3];
+    }
+    return true;
+}
+
+/* Eight events per turn of the loop; returns how many it mapped. */
+static size_t map_by_eight(evs_undistort_t *u, const evs_event_t *ev, size_t n, evs_point_t *points, uint16_t *tiles)
+{
+    const tables_t t = tables_of(u);
+    const evs_event_t *const end = ev + (n & ~(size_t)7u);
+    if (tiles == NULL) {
+        for (; ev != end; ev += 8, points += 8) {
+            if (!LIKELY(look_up_four(t, ev, points, NULL) && look_up_four(t, ev + 4, points + 4, NULL))) {
+                evs_undistort_map_plain(u, ev, 8u, points, NULL);
+            }
+        }
+    } else {
+        for (; ev != end; ev += 8, points += 8, tiles += 8) {
+            if (!LIKELY(look_up_four(t, ev, points, tiles) && look_up_four(t, ev + 4, points + 4, tiles + 4))) {
+                evs_undistort_map_plain(u, ev, 8u, points, tiles);
+            }
         }
     }
-    count_rejected(u, n_off);
+    return n & ~(size_t)7u;
+}
+#endif
+
+/* A table of step 1 and, unless `tiles` is NULL, a tile table. */
+static void map_exact(evs_undistort_t *u, const evs_event_t *ev, size_t n, evs_point_t *points, uint16_t *tiles)
+{
+    size_t done = 0u;
+#if EVS_SIMD_MVE
+    done = evs_undistort_map_mve(u, ev, n, points, tiles);
+#elif EVS_SIMD_DSP
+    done = map_by_eight(u, ev, n, points, tiles);
+#endif
+    if (done == n) { return; }
+    evs_undistort_map_plain(u, ev + done, n - done, points + done, (tiles != NULL) ? tiles + done : NULL);
 }
 
 static void map_grid(evs_undistort_t *u, const evs_event_t *ev, size_t n, evs_point_t *points)
@@ -473,7 +539,7 @@ void evs_undistort_map(evs_undistort_t *u, const evs_event_t *ev, size_t n, evs_
 {
     EVS_ASSERT((u != NULL) && ((n == 0u) || ((ev != NULL) && (points != NULL))));
     if (u->step_log2 == 0u) {
-        map_exact(u, ev, n, points);
+        map_exact(u, ev, n, points, NULL);
     } else {
         map_grid(u, ev, n, points);
     }
@@ -483,7 +549,7 @@ void evs_undistort_map_tiles(evs_undistort_t *u, const evs_event_t *ev, size_t n
 {
     EVS_ASSERT((u != NULL) && u->has_tiles && ((n == 0u) || (tiles != NULL)));
     if ((u->step_log2 == 0u) && (u->tiles != NULL)) {
-        map_exact_tiles(u, ev, n, points, tiles);
+        map_exact(u, ev, n, points, tiles);
         return;
     }
     evs_undistort_map(u, ev, n, points);

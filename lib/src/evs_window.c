@@ -80,21 +80,39 @@ static size_t count_before(const evs_event_t *ev, size_t n, uint32_t since_us, u
     return k;
 }
 
+/* Count one event; true when its tile now exceeds the threshold. */
+static inline bool count_one(uint16_t *counts, uint32_t tile, uint32_t threshold)
+{
+    if (tile == EVS_TILE_NONE) { return false; }
+    const uint32_t count = counts[tile] + 1u;
+    counts[tile] = (uint16_t)count;
+    return count > threshold;
+}
+
 /* Count events into tiles up to and with the one that exceeds the threshold; returns how many were counted. */
 static size_t count_tiles(evs_window_t *win, const uint16_t *tiles, size_t n)
 {
     const uint32_t threshold = win->cfg.threshold;
     uint16_t *const counts = win->tile_counts;
-    for (size_t i = 0u; i < n; i++) {
-        if (tiles[i] == EVS_TILE_NONE) { continue; }
-        EVS_ASSERT(tiles[i] < win->n_tiles);
-        const uint32_t count = counts[tiles[i]] + 1u;
-        counts[tiles[i]] = (uint16_t)count;
-        if (count > threshold) {
-            win->due = true;
-            return i + 1u;
+    const uint16_t *tile = tiles;
+    const uint16_t *const end = tiles + n;
+    const uint16_t *const end_of_fours = tiles + (n & ~(size_t)3u);
+    win->due = true;
+    while (tile != end_of_fours) {
+        EVS_ASSERT(((tile[0] < win->n_tiles) || (tile[0] == EVS_TILE_NONE)) &&
+                   ((tile[1] < win->n_tiles) || (tile[1] == EVS_TILE_NONE)) &&
+                   ((tile[2] < win->n_tiles) || (tile[2] == EVS_TILE_NONE)) &&
+                   ((tile[3] < win->n_tiles) || (tile[3] == EVS_TILE_NONE)));
+        if (count_one(counts, *tile++, threshold) || count_one(counts, *tile++, threshold) ||
+            count_one(counts, *tile++, threshold) || count_one(counts, *tile++, threshold)) {
+            return (size_t)(tile - tiles);
         }
     }
+    while (tile != end) {
+        EVS_ASSERT((*tile < win->n_tiles) || (*tile == EVS_TILE_NONE));
+        if (count_one(counts, *tile++, threshold)) { return (size_t)(tile - tiles); }
+    }
+    win->due = false;
     return n;
 }
 

@@ -201,13 +201,15 @@ static void test_the_last_position_in_range_is_one_and_the_next_is_none(void)
 
 /* --- undistortion ------------------------------------------------------------------------------------------------ */
 
-static evs_point_t point_table[EVS_UNDISTORT_POINTS(W, H, 1u)];
+static int16_t point_store[2u * EVS_UNDISTORT_POINTS(W, H, 1u) + 5u];
+static evs_point_t *point_table;
 static uint16_t tile_table[EVS_UNDISTORT_TILES(W, H)];
 static evs_event_t events[N_LONG];
 static uint16_t tile_store[N_LONG + 2];
 
-static void make_tables(evs_undistort_t *u)
+static void make_tables(evs_undistort_t *u, size_t odd)
 {
+    point_table = points_at(point_store, odd);
     for (size_t i = 0u; i < EVS_UNDISTORT_POINTS(W, H, 1u); i++) {
         point_table[i] = (evs_point_t){(int16_t)random_bits(), (int16_t)random_bits()};
         tile_table[i] = (uint16_t)random_bits();
@@ -262,8 +264,8 @@ static void look_up_and_check(evs_undistort_t *u, size_t n, size_t odd, bool wit
 static void test_look_up_at_every_length_and_alignment(void)
 {
     evs_undistort_t u;
-    make_tables(&u);
     for (int round = 0; round < 8; round++) {
+        make_tables(&u, (size_t)(round / 4));
         for (size_t n = 0u; n <= N_MAX; n++) {
             make_events(n, (round % 2) == 0);
             for (size_t odd = 0u; odd < 2u; odd++) {

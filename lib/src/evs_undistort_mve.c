@@ -1,0 +1,62 @@
+/* SPDX-License-Identifier: MIT
+ * SPDX-FileCopyrightText: 2026 the evstab authors */
+#include "evs_undistort_kernel.h"
+
+#if EVS_SIMD_MVE
+
+#include <arm_mve.h>
+
+typedef struct {
+    const uint32_t *points;
+    const uint16_t *tiles;
+    uint32_t width_px;
+    uint16x8_t last;    /* x and y of the last pixel */
+    uint32x4_t offsets; /* of four events, in bytes */
+    uint32x4_t polarity;
+} tables_t;
+
+/* One subtraction finds what is off the sensor. Points lie at multiples of 2, hence the store by 16 bits. */
+static inline __attribute__((always_inline)) bool map_four(const tables_t *t, const uint32_t *pairs,
+                                                           evs_point_t *points, uint16_t *tiles)
+{
+    const uint32x4_t xy = vbicq_u32(vldrwq_gather_offset_u32(pairs, t->offsets), t->polarity);
+    const uint16x8_t beyond = vqsubq_u16(vreinterpretq_u16_u32(xy), t->last);
+    if (vcmpneq_n_u16(beyond, 0u) != 0u) { return false; }
+    const uint32x4_t at = vmlaq_n_u32(vmovlbq_u16(vreinterpretq_u16_u32(xy)), vshrq_n_u32(xy, 16), t->width_px);
+    const uint32x4_t found = vldrwq_gather_shifted_offset_u32(t->points, at);
+    vstrhq_u16((uint16_t *)(void *)points, vreinterpretq_u16_u32(found));
+    if (tiles != NULL) { vstrhq_u32(tiles, vldrhq_gather_shifted_offset_u32(t->tiles, at)); }
+    return true;
+}
+
+size_t evs_undistort_map_mve(evs_undistort_t *u, const evs_event_t *ev, size_t n, evs_point_t *points, uint16_t *tiles)
+{
+    if (((uintptr_t)u->points & 3u) != 0u) { return 0u; } /* a gather asks for whole words */
+    const tables_t t = {
+        (const uint32_t *)(const void *)u->points,
+        u->tiles,
+        u->width_px,
+        vreinterpretq_u16_u32(vdupq_n_u32((u->width_px - 1u) | ((u->height_px - 1u) << 16))),
+        vmulq_n_u32(vidupq_n_u32(0u, 1), sizeof(evs_event_t)),
+        vdupq_n_u32((uint32_t)EVS_EVENT_POLARITY_BIT << 16),
+    };
+    const evs_event_t *const end = ev + (n & ~(size_t)3u);
+    if (tiles == NULL) {
+        for (; ev != end; ev += 4, points += 4) {
+            if (!map_four(&t, (const uint32_t *)(const void *)&ev->x_px, points, NULL)) {
+                evs_undistort_map_plain(u, ev, 4u, points, NULL);
+            }
+        }
+    } else {
+        for (; ev != end; ev += 4, points += 4, tiles += 4) {
+            if (!map_four(&t, (const uint32_t *)(const void *)&ev->x_px, points, tiles)) {
+                evs_undistort_map_plain(u, ev, 4u, points, tiles);
+            }
+        }
+    }
+    return n & ~(size_t)3u;
+}
+
+#else
+typedef int evs_undistort_mve_empty_t; /* ISO C wants a declaration in every file. */
+#endif
