@@ -16,6 +16,7 @@ set(EVS_SOURCES
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_homography_mve.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_orientation_track.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_pipeline.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_recip_table.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_stabilize.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_tiles.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_types.c

@@ -141,6 +141,11 @@ evs_point_t evs_homography_map_exact(const evs_homography_t *h, evs_point_t p)
     return mapped;
 }
 
+void evs_homography_map_plain(const evs_homography_t *h, const evs_point_t *in, size_t n, evs_point_t *out)
+{
+    for (size_t i = 0u; i < n; i++) { out[i] = map_fast(h, in[i]); }
+}
+
 void evs_homography_map(const evs_homography_t *h, const evs_point_t *in, size_t n, evs_point_t *out)
 {
     EVS_ASSERT((h != NULL) && (((in != NULL) && (out != NULL)) || (n == 0u)));
@@ -156,5 +161,5 @@ void evs_homography_map(const evs_homography_t *h, const evs_point_t *in, size_t
 #elif EVS_SIMD_DSP
     done = evs_homography_map_dsp(h, in, n, out);
 #endif
-    for (size_t i = done; i < n; i++) { out[i] = map_fast(h, in[i]); }
+    if (done < n) { evs_homography_map_plain(h, in + done, n - done, out + done); }
 }

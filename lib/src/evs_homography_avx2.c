@@ -60,11 +60,11 @@ AVX2 size_t evs_homography_map_avx2(const evs_homography_t *h, const evs_point_t
         const __m256i refused = _mm256_or_si256(_mm256_cmpgt_epi32(cell, _mm256_set1_epi32(EVS_RECIP_CELLS - 1)),
                                                 _mm256_cmpeq_epi32(xy, marker));
         if (_mm256_testz_si256(refused, refused) == 0) {
-            for (size_t k = i; k < i + 8u; k++) { out[k] = map_fast(h, in[k]); }
+            evs_homography_map_plain(h, in + i, 8u, out + i);
             continue;
         }
-        const __m256i value = _mm256_i32gather_epi32(&EVS_RECIP_Q29[0][0], cell, 8);
-        const __m256i slope = _mm256_i32gather_epi32(&EVS_RECIP_Q29[0][1], cell, 8);
+        const __m256i value = _mm256_i32gather_epi32(&evs_recip_q29[0][0], cell, 8);
+        const __m256i slope = _mm256_i32gather_epi32(&evs_recip_q29[0][1], cell, 8);
         /* slope * f / 2^16 with f the signed low half of w: multiplied by f * 2^16, the upper half of the product. */
         const __m256i r = _mm256_add_epi32(value, mul_hi(slope, _mm256_slli_epi32(w, 16)));
         const __m256i x = _mm256_srai_epi32(_mm256_add_epi32(cx, mul_hi(apply_row(row_a, xy), r)), 9);

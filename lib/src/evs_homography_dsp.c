@@ -100,8 +100,6 @@ EVS_STATIC_ASSERT(offsetof(block_t, saved) == 52u, "OFFSET_SAVED");
                      "ldmia  r12, {r4-r11, pc}              \n" ::                                                     \
                          : "r0", "r1", "r2", "r3", "r12", "cc", "memory")
 
-typedef evs_point_t *map_pairs_fn(block_t *block, const evs_point_t *in, evs_point_t *out, int32_t minus_pairs);
-
 static __attribute__((naked, noinline)) evs_point_t *map_pairs(__attribute__((unused)) block_t *block,
                                                                __attribute__((unused)) const evs_point_t *in,
                                                                __attribute__((unused)) evs_point_t *out,
@@ -142,7 +140,7 @@ size_t evs_homography_map_dsp(const evs_homography_t *h, const evs_point_t *in, 
     block.wx = h->wx_q35;
     block.wy = h->wy_q35;
     block.w0 = h->w0_q23;
-    block.recip = EVS_RECIP_Q29;
+    block.recip = evs_recip_q29;
     block.ax = h->ax_q28;
     block.ay = h->ay_q28;
     block.a0 = h->a0_q16;
@@ -156,11 +154,11 @@ size_t evs_homography_map_dsp(const evs_homography_t *h, const evs_point_t *in, 
     size_t done = 0u;
     while (n - done >= 2u) {
         const int32_t minus_pairs = -(int32_t)((n - done) / 2u);
-        const evs_point_t *const end = (wide ? map_pairs_wide : map_pairs)(&block, in + done, out + done, minus_pairs);
+        const evs_point_t *const end = wide ? map_pairs_wide(&block, in + done, out + done, minus_pairs)
+                                            : map_pairs(&block, in + done, out + done, minus_pairs);
         done = (size_t)(end - out);
         if (n - done >= 2u) {
-            out[done] = map_fast(h, in[done]);
-            out[done + 1u] = map_fast(h, in[done + 1u]);
+            evs_homography_map_plain(h, in + done, 2u, out + done);
             done += 2u;
         }
     }

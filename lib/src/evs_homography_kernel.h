@@ -5,10 +5,14 @@
 #define EVS_HOMOGRAPHY_KERNEL_H
 
 #include "evs/homography.h"
-#include "evs_recip_table.h"
 #include "evs_simd.h"
 
-#define W_CELL_BITS 15 /* Depth ratio Q23: 256 cells of 2^15 on [1/2, 3/2). */
+#define W_CELL_BITS     15 /* Depth ratio Q23: 256 cells of 2^15 on [1/2, 3/2). */
+#define EVS_RECIP_CELLS 256
+extern const int32_t evs_recip_q29[EVS_RECIP_CELLS][2]; /* 1 / ratio: value and slope in each cell */
+
+/* Plain C, point by point: map_fast() of n points, also where a variant below refuses some. */
+void evs_homography_map_plain(const evs_homography_t *h, const evs_point_t *in, size_t n, evs_point_t *out);
 
 /* The map by exact division, for points that the fast path refuses. */
 evs_point_t evs_homography_map_exact(const evs_homography_t *h, evs_point_t p);
@@ -71,7 +75,7 @@ static inline bool position_q4(const evs_homography_t *h, int32_t xy, int32_t *x
     const int32_t w_q23 = ratio_q23(h, xy);
     const uint32_t cell = (uint32_t)w_q23 >> W_CELL_BITS;
     if (cell >= EVS_RECIP_CELLS) { return false; }
-    const int32_t r_q29 = madw_low(EVS_RECIP_Q29[cell][0], EVS_RECIP_Q29[cell][1], w_q23);
+    const int32_t r_q29 = madw_low(evs_recip_q29[cell][0], evs_recip_q29[cell][1], w_q23);
     const int32_t a_q16 = madw_high(madw_low(h->a0_q16, h->ax_q28, xy), h->ay_q28, xy);
     const int32_t b_q16 = madw_high(madw_low(h->b0_q16, h->bx_q28, xy), h->by_q28, xy);
     *x_q4 = add_mul_hi(h->cx_q13, a_q16, r_q29) >> 9;

@@ -33,11 +33,6 @@ static uint16_t refused_from_q4(const evs_homography_t *h)
     return (uint16_t)((reach_q4 < from_q4) ? reach_q4 : from_q4);
 }
 
-static __attribute__((noinline)) void map_four(const evs_homography_t *h, const evs_point_t *in, evs_point_t *out)
-{
-    for (size_t k = 0u; k < 4u; k++) { out[k] = map_fast(h, in[k]); }
-}
-
 size_t evs_homography_map_mve(const evs_homography_t *h, const evs_point_t *in, size_t n, evs_point_t *out)
 {
     const uint16_t from_q4 = refused_from_q4(h);
@@ -52,8 +47,8 @@ size_t evs_homography_map_mve(const evs_homography_t *h, const evs_point_t *in, 
         bool refused = vcmphiq_n_u32(cell, EVS_RECIP_CELLS - 1u) != 0u;
         if (!refused) {
             const uint32x4_t at = vshlq_n_u32(cell, 1);
-            const int32x4_t value = vldrwq_gather_shifted_offset_s32(&EVS_RECIP_Q29[0][0], at);
-            const int32x4_t slope = vldrwq_gather_shifted_offset_s32(&EVS_RECIP_Q29[0][1], at);
+            const int32x4_t value = vldrwq_gather_shifted_offset_s32(&evs_recip_q29[0][0], at);
+            const int32x4_t slope = vldrwq_gather_shifted_offset_s32(&evs_recip_q29[0][1], at);
             const int32x4_t r = vaddq_s32(value, vmulhq_s32(slope, vshlq_n_s32(w, 16)));
             const int32x4_t a = apply_row(c.a0_q16, c.ax_q28, c.ay_q28, x, y);
             const int32x4_t b = apply_row(c.b0_q16, c.bx_q28, c.by_q28, x, y);
@@ -66,7 +61,7 @@ size_t evs_homography_map_mve(const evs_homography_t *h, const evs_point_t *in, 
             refused = vcmpcsq_n_u16(vreinterpretq_u16_s16(vabsq_s16(p)), from_q4) != 0u;
             if (!refused) { vstrhq_s16(&out->x_q4, p); }
         }
-        if (refused) { map_four(h, in, out); }
+        if (refused) { evs_homography_map_plain(h, in, 4u, out); }
         in += 4;
         out += 4;
     }

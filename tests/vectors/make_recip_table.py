@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 # SPDX-FileCopyrightText: 2026 the evstab authors
-"""Make lib/src/evs_recip_table.h: 1 / w on [1/2, 3/2) as straight lines over 256 cells.
+"""Make lib/src/evs_recip_table.c: 1 / w on [1/2, 3/2) as straight lines over 256 cells.
 
-    make_recip_table.py           print the header
+    make_recip_table.py           print the file
     make_recip_table.py --check F compare it with the file F; exit 1 if they differ
 
 On a cell [lo, hi) the line is v + s f / 2^16, f the distance of w from an edge in units of half the width of a cell pair:
@@ -39,33 +39,28 @@ def cell(i):
     return round(edge * 2**Q), round(2 * s * 2**Q)
 
 
-def header():
+def source():
     lines = ["/* SPDX-License-Identifier: MIT",
              " * SPDX-FileCopyrightText: 2026 the evstab authors */",
              "/* Made by tests/vectors/make_recip_table.py, which says how; do not edit. */",
-             "#ifndef EVS_RECIP_TABLE_H",
-             "#define EVS_RECIP_TABLE_H",
-             "",
-             "#include <stdint.h>",
-             "",
-             "#define EVS_RECIP_CELLS 256",
+             '#include "evs_homography_kernel.h"',
              "",
              "/* clang-format off */",
              "/* Value at the edge that the fraction starts from, and slope across two cells, Q29. */",
-             "static const int32_t EVS_RECIP_Q29[EVS_RECIP_CELLS][2] = {"]
+             "const int32_t evs_recip_q29[EVS_RECIP_CELLS][2] = {"]
     cells = ["{%d, %d}" % cell(i) for i in range(CELLS)]
     for i in range(0, CELLS, 4):
         lines.append("    " + ", ".join(cells[i:i + 4]) + ",")
-    lines += ["};", "", "#endif", ""]
+    lines += ["};", ""]
     return "\n".join(lines)
 
 
 def main():
     if len(sys.argv) == 1:
-        sys.stdout.write(header())
+        sys.stdout.write(source())
     elif len(sys.argv) == 3 and sys.argv[1] == "--check":
         with open(sys.argv[2], encoding="utf-8") as f:
-            if f.read() != header():
+            if f.read() != source():
                 sys.exit(sys.argv[2] + " is not what make_recip_table.py makes")
         print("same as generated")
     else:

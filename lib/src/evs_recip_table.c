@@ -1,16 +1,11 @@
 /* SPDX-License-Identifier: MIT
  * SPDX-FileCopyrightText: 2026 the evstab authors */
 /* Made by tests/vectors/make_recip_table.py, which says how; do not edit. */
-#ifndef EVS_RECIP_TABLE_H
-#define EVS_RECIP_TABLE_H
-
-#include <stdint.h>
-
-#define EVS_RECIP_CELLS 256
+#include "evs_homography_kernel.h"
 
 /* clang-format off */
 /* Value at the edge that the fraction starts from, and slope across two cells, Q29. */
-static const int32_t EVS_RECIP_Q29[EVS_RECIP_CELLS][2] = {
+const int32_t evs_recip_q29[EVS_RECIP_CELLS][2] = {
     {1073733727, -16647160}, {1057214808, -16391050}, {1057214989, -16140805}, {1041196638, -15896247},
     {1041196807, -15657206}, {1025656611, -15423516}, {1025656771, -15195020}, {1010573635, -14971564},
     {1010573785, -14753001}, {995927837, -14539189}, {995927979, -14329992}, {981700482, -14125278},
@@ -76,5 +71,3 @@ static const int32_t EVS_RECIP_Q29[EVS_RECIP_CELLS][2] = {
     {365528810, -1939147}, {363594796, -1928887}, {363594798, -1918708}, {361681142, -1908609},
     {361681145, -1898590}, {359787527, -1888650}, {359787529, -1878788}, {357913637, -1869002},
 };
-
-#endif
