@@ -48,8 +48,8 @@ static evs_pinhole_t random_camera(void)
     const bool centred = below(4u) != 0u;
     const int32_t f = between(SIZES[i][0] / 2, (below(4u) == 0u) ? 8000 : SIZES[i][0] * 2);
     evs_pinhole_t k = {SIZES[i][0], SIZES[i][1], (f << 16) + (int32_t)below(65536u), f << 16, 0, 0};
-    k.cx_q16 = centred ? (SIZES[i][0] << 15) + (int32_t)below(1u << 20) : between(-2000, 3000) << 16;
-    k.cy_q16 = centred ? (SIZES[i][1] << 15) - (int32_t)below(1u << 20) : between(-2000, 3000) << 16;
+    k.cx_q16 = centred ? (SIZES[i][0] << 15) + (int32_t)below(1u << 20) : between(-2000, 3000) * 65536;
+    k.cy_q16 = centred ? (SIZES[i][1] << 15) - (int32_t)below(1u << 20) : between(-2000, 3000) * 65536;
     TEST_ASSERT_EQUAL_INT(EVS_OK, evs_pinhole_check(&k));
     return k;
 }

@@ -13,7 +13,7 @@
  *          Guards for AREA and COUNT: a window that is due stays open until it spans min_duration_us, and an event
  *          max_duration_us or more after a window's first event opens the next one.
  * Memory   one evs_window_t and, for AREA, one uint16_t per tile of caller memory.
- * Cost     about 8 instructions per event; one memset of the tile counts per window.
+ * Cost     8 instructions per event by AREA; one memset of the tile counts per window.
  * Numeric  integers only, bit-exact on every target; independent of how the stream is split into batches.
  * Time     wraps; a window must span less than 2^31 us (35 min), which max_duration_us ensures.
  * Threads  no shared state; one context must not be entered from two threads or ISRs at once.
