@@ -21,7 +21,7 @@ static inline __attribute__((always_inline)) bool map_four(const tables_t *t, co
 {
     const uint32x4_t xy = vbicq_u32(vldrwq_gather_offset_u32(pairs, t->offsets), t->polarity);
     const uint16x8_t beyond = vqsubq_u16(vreinterpretq_u16_u32(xy), t->last);
-    if (vcmpneq_n_u16(beyond, 0u) != 0u) { return false; }
+    if (vaddvq_u16(beyond) != 0u) { return false; }
     const uint32x4_t at = vmlaq_n_u32(vmovlbq_u16(vreinterpretq_u16_u32(xy)), vshrq_n_u32(xy, 16), t->width_px);
     const uint32x4_t found = vldrwq_gather_shifted_offset_u32(t->points, at);
     vstrhq_u16((uint16_t *)(void *)points, vreinterpretq_u16_u32(found));
