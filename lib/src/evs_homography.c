@@ -31,59 +31,76 @@ evs_status_t evs_pinhole_check(const evs_pinhole_t *k)
     return ok ? EVS_OK : EVS_ERR_ARG;
 }
 
-/* num / den in Q30 for a quotient in (1/2, 2); both positive. */
-static int32_t ratio_q30(int32_t num, int32_t den)
-{
+typedef struct { /* 1 / x = r 2^-shift */
+    uint32_t r;
     unsigned shift;
-    const uint32_t r = evs_recip_u32((uint32_t)den, &shift);
-    return evs_sat32((int64_t)(((uint64_t)(uint32_t)num * r) >> (shift - 30u)));
+} recip_t;
+
+static recip_t recip_of(int32_t x)
+{
+    recip_t inverse;
+    inverse.r = evs_recip_u32((uint32_t)x, &inverse.shift);
+    return inverse;
+}
+
+/* num / den in Q30 for a quotient in (1/2, 2); both positive. */
+static int32_t ratio_q30(int32_t num, recip_t den)
+{
+    const uint64_t q = ((uint64_t)(uint32_t)num * den.r) >> (den.shift - 30u);
+    return (q > (uint64_t)INT32_MAX) ? INT32_MAX : (int32_t)q;
 }
 
 static bool below(int64_t x, int64_t limit) { return (x < limit) && (x > -limit); }
 
-static void set_fast(evs_homography_t *h, const evs_pinhole_t *k)
+static int64_t mul_q30(int32_t a, int32_t b) { return evs_shr_r64((int64_t)a * b, 30); }
+
+/* The constant of a row expanded in x and y: row . (third, -cx, -cy) / 2^28. */
+static int64_t constant_of(int64_t third, int32_t row_x, int32_t row_y, const evs_homography_t *h)
+{
+    return evs_shr_r64(third - (int64_t)row_x * h->cx_q16 - (int64_t)row_y * h->cy_q16, 28);
+}
+
+static void set_fast(evs_homography_t *h, const evs_pinhole_t *k, recip_t fx_recip)
 {
     /* Depth ratio at the image centre, Q28. Dividing by it puts the ratios of the image around 1. */
-    const int64_t dx_q16 = ((int64_t)k->width_px - 1) * 32768 - k->cx_q16;
-    const int64_t dy_q16 = ((int64_t)k->height_px - 1) * 32768 - k->cy_q16;
-    const int64_t z_q46 = h->row_q30[2][0] * dx_q16 + h->row_q30[2][1] * dy_q16 + (int64_t)h->row_q30[2][2] * k->fx_q16;
-    unsigned fx_shift;
-    const uint32_t fx_recip = evs_recip_u32((uint32_t)k->fx_q16, &fx_shift);
-    const int64_t w_q28 = evs_shr_r64((z_q46 >> 31) * (int64_t)fx_recip, fx_shift - 29u); /* Q15 * Q16 / Q16 */
-    h->fast = false;
+    const int32_t dx_q16 = ((int32_t)k->width_px - 1) * 32768 - k->cx_q16;
+    const int32_t dy_q16 = ((int32_t)k->height_px - 1) * 32768 - k->cy_q16;
+    const int64_t z_q46 =
+        (int64_t)h->row_q30[2][0] * dx_q16 + (int64_t)h->row_q30[2][1] * dy_q16 + (int64_t)h->row_q30[2][2] * k->fx_q16;
+    const int64_t w_q28 = evs_shr_r64((z_q46 >> 31) * (int64_t)fx_recip.r, fx_recip.shift - 29u); /* Q15 Q16 / Q16 */
     if ((w_q28 < (INT64_C(1) << 26)) || (w_q28 > INT32_MAX)) { return; } /* below 1/4, or absurd */
-    unsigned w_shift;
-    const uint32_t w_recip = evs_recip_u32((uint32_t)w_q28, &w_shift);
-    const int64_t inv_q28 = (int64_t)(w_recip >> (w_shift - 56u)); /* at most 4 */
+    const recip_t w_recip = recip_of((int32_t)w_q28);
+    const int32_t inv_q28 = (int32_t)(w_recip.r >> (w_recip.shift - 56u)); /* at most 4 */
 
-    const int64_t ax = evs_shr_r64(h->row_q30[0][0] * inv_q28, 30);
-    const int64_t ay = evs_shr_r64(h->row_q30[0][1] * inv_q28, 30);
-    const int64_t bx = evs_shr_r64(h->row_q30[1][0] * inv_q28, 30);
-    const int64_t by = evs_shr_r64(h->row_q30[1][1] * inv_q28, 30);
-    const int64_t a0 =
-        evs_shr_r64(evs_shr_r64(h->row_q30[0][2] * inv_q28, 30) * k->fx_q16 - ax * k->cx_q16 - ay * k->cy_q16, 28);
-    const int64_t b0 =
-        evs_shr_r64(evs_shr_r64(h->row_q30[1][2] * inv_q28, 30) * k->fy_q16 - bx * k->cx_q16 - by * k->cy_q16, 28);
+    const int64_t ax = mul_q30(h->row_q30[0][0], inv_q28);
+    const int64_t ay = mul_q30(h->row_q30[0][1], inv_q28);
+    const int64_t bx = mul_q30(h->row_q30[1][0], inv_q28);
+    const int64_t by = mul_q30(h->row_q30[1][1], inv_q28);
     /* (r / w) / fx: Q28 times 2^16 / fx_q16, to Q35. */
-    const int64_t wx = evs_shr_r64(evs_shr_r64(h->row_q30[2][0] * inv_q28, 30) * (int64_t)fx_recip, fx_shift - 23u);
-    const int64_t wy = evs_shr_r64(evs_shr_r64(h->row_q30[2][1] * inv_q28, 30) * (int64_t)fx_recip, fx_shift - 23u);
+    const int64_t wx = evs_shr_r64(mul_q30(h->row_q30[2][0], inv_q28) * (int64_t)fx_recip.r, fx_recip.shift - 23u);
+    const int64_t wy = evs_shr_r64(mul_q30(h->row_q30[2][1], inv_q28) * (int64_t)fx_recip.r, fx_recip.shift - 23u);
     if (!below(ax, COEF_MAX_Q28) || !below(ay, COEF_MAX_Q28) || !below(bx, COEF_MAX_Q28) || !below(by, COEF_MAX_Q28) ||
-        !below(a0, SHIFT_MAX_Q16) || !below(b0, SHIFT_MAX_Q16) || !below(wx, W_COEF_MAX) || !below(wy, W_COEF_MAX)) {
+        !below(wx, W_COEF_MAX) || !below(wy, W_COEF_MAX)) {
         return;
     }
-    const int64_t w0 = evs_shr_r64(
-        evs_shr_r64(h->row_q30[2][2] * inv_q28, 30) * (INT64_C(1) << 23) - wx * k->cx_q16 - wy * k->cy_q16, 28);
-    if (!below(w0, W0_MAX_Q23)) { return; }
-
-    /* Each row rounds down twice; +1 centres that. The kernel wants the depth ratio less 1/2. */
     h->ax_q28 = (int32_t)ax;
     h->ay_q28 = (int32_t)ay;
-    h->a0_q16 = (int32_t)a0 + 1;
     h->bx_q28 = (int32_t)bx;
     h->by_q28 = (int32_t)by;
-    h->b0_q16 = (int32_t)b0 + 1;
     h->wx_q35 = (int32_t)wx;
     h->wy_q35 = (int32_t)wy;
+    /* Entries of the third column are at most 1, and 4 after the division: 32 bits. */
+    const int32_t az_q28 = (int32_t)mul_q30(h->row_q30[0][2], inv_q28);
+    const int32_t bz_q28 = (int32_t)mul_q30(h->row_q30[1][2], inv_q28);
+    const int32_t wz_q28 = (int32_t)mul_q30(h->row_q30[2][2], inv_q28);
+    const int64_t a0 = constant_of((int64_t)az_q28 * k->fx_q16, h->ax_q28, h->ay_q28, h);
+    const int64_t b0 = constant_of((int64_t)bz_q28 * k->fy_q16, h->bx_q28, h->by_q28, h);
+    const int64_t w0 = constant_of((int64_t)wz_q28 * (INT32_C(1) << 23), h->wx_q35, h->wy_q35, h);
+    if (!below(a0, SHIFT_MAX_Q16) || !below(b0, SHIFT_MAX_Q16) || !below(w0, W0_MAX_Q23)) { return; }
+
+    /* Each row rounds down twice; +1 centres that. The kernel wants the depth ratio less 1/2. */
+    h->a0_q16 = (int32_t)a0 + 1;
+    h->b0_q16 = (int32_t)b0 + 1;
     h->w0_q23 = (int32_t)w0 + 1 - (INT32_C(1) << 22);
     /* Half an output LSB, for the rounding. */
     h->cx_q13 = evs_shr_r(k->cx_q16, 3) + (1 << 8);
@@ -95,16 +112,25 @@ void evs_homography_set(evs_homography_t *h, const evs_pinhole_t *k, evs_quat_t 
 {
     EVS_ASSERT((h != NULL) && (evs_pinhole_check(k) == EVS_OK));
     const evs_mat3_t r = evs_quat_to_mat3(q_ba);
-    const int32_t g_q30 = ratio_q30(k->fx_q16, k->fy_q16);
-    const int32_t g_inv_q30 = ratio_q30(k->fy_q16, k->fx_q16);
-    *h = (evs_homography_t){.row_q30 = {{r.m[0][0], evs_q_mul_sat(r.m[0][1], g_q30, 30), r.m[0][2]},
-                                        {evs_q_mul_sat(r.m[1][0], g_inv_q30, 30), r.m[1][1], r.m[1][2]},
-                                        {r.m[2][0], evs_q_mul_sat(r.m[2][1], g_q30, 30), r.m[2][2]}},
-                            .fx_q16 = k->fx_q16,
-                            .fy_q16 = k->fy_q16,
-                            .cx_q16 = k->cx_q16,
-                            .cy_q16 = k->cy_q16};
-    set_fast(h, k);
+    const recip_t fx_recip = recip_of(k->fx_q16);
+    const recip_t fy_recip = (k->fy_q16 == k->fx_q16) ? fx_recip : recip_of(k->fy_q16);
+    const int32_t g_q30 = ratio_q30(k->fx_q16, fy_recip);
+    const int32_t g_inv_q30 = ratio_q30(k->fy_q16, fx_recip);
+    h->row_q30[0][0] = r.m[0][0];
+    h->row_q30[0][1] = evs_q_mul_sat(r.m[0][1], g_q30, 30);
+    h->row_q30[0][2] = r.m[0][2];
+    h->row_q30[1][0] = evs_q_mul_sat(r.m[1][0], g_inv_q30, 30);
+    h->row_q30[1][1] = r.m[1][1];
+    h->row_q30[1][2] = r.m[1][2];
+    h->row_q30[2][0] = r.m[2][0];
+    h->row_q30[2][1] = evs_q_mul_sat(r.m[2][1], g_q30, 30);
+    h->row_q30[2][2] = r.m[2][2];
+    h->fx_q16 = k->fx_q16;
+    h->fy_q16 = k->fy_q16;
+    h->cx_q16 = k->cx_q16;
+    h->cy_q16 = k->cy_q16;
+    h->fast = false;
+    set_fast(h, k, fx_recip);
 }
 
 /* c + fx num / z in 1/16 px, rounded half up; false when beyond the range of a point. z in [2^30, 2^31). */

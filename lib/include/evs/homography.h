@@ -7,8 +7,8 @@
  * Model    the view of a pinhole camera after a rotation about its centre. q = q_ba takes rays of frame a into frame b;
  *          the points of the image seen from a are mapped to where b sees them.
  * Memory   one evs_homography_t. No heap, no globals; a constant table of 2 KB.
- * Cost     set: about 1200 instructions. map, per point near the image (depth ratio within 1/2..3/2 of that at the
- *          image centre: every rotation up to a saccade): 20 on Cortex-M4, M7 and M33, 13 on M55, 61 on RV32IMAC. A
+ * Cost     set: about 650 instructions. map, per point near the image (depth ratio within 1/2..3/2 of that at the
+ *          image centre: every rotation up to a saccade): 20 on Cortex-M4, M7 and M33, 10 on M55, 61 on RV32IMAC. A
  *          point elsewhere takes two 64-bit divisions. On Cortex-M4, M7 and M33 let arrays start at multiples of 4.
  * Numeric  points 1/16 px in and out; integers only; same bits with and without SIMD. The exact quotient rounded half
  *          up, with an error before rounding <= 1/64 px: in all <= 3/64 px of the real map of the given point.
