@@ -7,8 +7,9 @@
  * Model    Between two samples a cubic Hermite curve in the rotation vector, whose ends have the samples' orientations
  *          and rates. Past the newest sample rate and angular acceleration are held, up to max_predict_us. On hand
  *          motion at 95 Hz the error is 0.008 deg against 0.049 deg for spherical interpolation.
- * Memory   caller-owned: one evs_orientation_track_t and a ring of at least EVS_ORIENTATION_TRACK_MIN samples (32 B
- * each). Cost     push O(1); query O(samples newer than t) + one logarithm and one exponential, about 700 instructions.
+ * Memory   caller-owned: one evs_orientation_track_t and a ring of at least EVS_ORIENTATION_TRACK_MIN samples of 32 B.
+ * Cost     push O(1); query O(samples newer than t) and one logarithm and one exponential: the larger part of the new
+ *          orientation that docs/performance.md counts.
  * Numeric  integers only, bit-exact on every target. Orientation error against the same curve in double <= 1e-6 rad.
  * Time     samples carry the time of their own clock; queries are in event time: t_event = t_sample + offset_us.
  *          Both wrap; a query must lie within 2^31 us (35 min) of the samples in the ring.

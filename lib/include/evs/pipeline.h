@@ -16,7 +16,7 @@
  * Memory   one evs_pipeline_t and one block of caller memory: evs_pipeline_bytes(), or for a static array
  *          EVS_PIPELINE_BYTES(). For 240 x 180 with a grid of step 8, 34 x 26 tiles, 2048 events, 32 orientations and
  *          batches of 128: 22 KB and the context of about 1 KB.
- * Cost     per event undistort + window + rotate (docs/performance.md); per slice about 1500 instructions.
+ * Cost     per event undistort + window + rotate, per slice a new orientation: docs/performance.md counts both.
  * Numeric  integers only, bit-exact on every target. The output does not depend on how the input is split into calls,
  *          as long as no prediction is needed.
  * Time     Events in order (equal times allowed), each sensor in order. An event whose time runs back is dropped and

@@ -5,15 +5,17 @@
  * @brief Holds the view still: rotates undistorted points from the camera's orientation to a reference orientation.
  *
  * Model    x' ~ K R(q_C*) K^-1 x with q_C* = q_C0^-1 q_C (reference from camera) [1]. The reference is the orientation
- * at the first event. A saccade moves it to the current orientation when, at the start of a window, the mapped image
- * centre lies further than saccade_px_q4 from the image centre. Rotation  WINDOW  one rotation per window, that of its
- * first event, as the released code of [1]; SLICE   the rotation follows the attitude in time slices. A slice lasts
- * slice_max_us, or less when the camera turns so fast that it would smear a point by more than slice_blur_q4 to either
- * side of its middle, whose orientation serves the whole slice. Memory   one evs_stabilize_t. Cost     per event
- * evs_homography_map(); per slice about 500 instructions. Numeric  integers only, bit-exact on every target. Points
- * 1/16 px; error of the rotation of a given point <= 3/64 px. Points behind the camera or beyond 2047 px become
- * EVS_POINT_OUTSIDE at any rotation; nothing wraps. Threads  no shared state; one context must not be entered from two
- * threads or ISRs at once.
+ *          at the first event. A saccade moves it to the current orientation when, at the start of a window, the
+ *          mapped image centre lies further than saccade_px_q4 from the image centre.
+ *          Rotation  WINDOW  one rotation per window, that of its first event, as the released code of [1];
+ *                    SLICE   the rotation follows the attitude in time slices. A slice lasts slice_max_us, or less
+ *                            when the camera turns so fast that it would smear a point by more than slice_blur_q4 to
+ *                            either side of its middle, whose orientation serves the whole slice.
+ * Memory   one evs_stabilize_t.
+ * Cost     per event evs_homography_map(); per slice evs_homography_set() and a quaternion product.
+ * Numeric  integers only, bit-exact on every target. Points 1/16 px; error of the rotation of a given point <= 3/64 px.
+ *          Points behind the camera or beyond 2047 px become EVS_POINT_OUTSIDE at any rotation; nothing wraps.
+ * Threads  no shared state; one context must not be entered from two threads or ISRs at once.
  *
  * [1] J. P. Rodriguez-Gomez, J. R. Martinez-de Dios, A. Ollero, G. Gallego, "On the Benefits of Visual Stabilization
  *     for Frame- and Event-based Perception", IEEE RA-L 2024. doi:10.1109/LRA.2024.3450290

@@ -8,7 +8,7 @@
  *          q and -q are the same rotation; functions keep the sign that the formula gives unless they say otherwise.
  * Memory   none; the functions are pure.
  * Cost     product 16 multiplications; exponential about 15, and a product per halving beyond 1 rad; logarithm one
- * root, one atan2, one reciprocal. evs_quat_rate() divides (64 bits): it is for input at hand, not for the hot path.
+ *          root, one atan2, one reciprocal. evs_quat_rate() divides (64 bits): it is not for the hot path.
  * Numeric  integers only, bit-exact on every target. Quaternions and matrices Q30, vectors in any Q that the caller
  *          keeps track of. Rounds to nearest, halves up. Errors: tests/unit/test_vec.c.
  * Threads  no state.

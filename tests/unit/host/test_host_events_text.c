@@ -90,9 +90,9 @@ static void test_each_fault_is_counted_by_cause_with_its_first_line(void)
                                                  "1.29 2 2 1\n"         /* 10: back */
                                                  "1000000000.0 2 2 1\n" /* 11: jump */
                                                  "1.4 2 2 1\n"
-                                                 "1.5 2 2 2\n"              /* 13: malformed: p */
+                                                 "1.5 2 2 2\n"           /* 13: malformed: p */
                                                  "99999999999.0 1 1 1\n" /* 14: out of range */
-                                                 "1.6 2.5 2 1\n"            /* 15: malformed */
+                                                 "1.6 2.5 2 1\n"         /* 15: malformed */
                                                  "1.7 3 3 0\n"),
                                        CAP));
     TEST_ASSERT_EQUAL_UINT(4, n_read);
