@@ -12,7 +12,7 @@
  *          EVS_UNDISTORT_TILES(w, h) indices of 2 bytes. Both tables may lie in flash.
  *            240 x 180   step 1 172800 B   step 4 11224 B   step 8 2976 B    tiles 86400 B
  *            640 x 480   step 1 1228800 B  step 8 19764 B   step 16 5084 B   tiles 614400 B
- * Cost     per event 8 instructions (Cortex-M4/M7; M55: 4) with step 1 and 46 on a grid; the tile 2 more from a table,
+ * Cost     per event 8 instructions (Cortex-M4/M7; M55: 3) with step 1 and 46 on a grid; the tile 2 more from a table,
  *          24 computed. Building takes one inversion of the lens per point with step 1 and about five on a grid: 45
  *          million instructions for 240 x 180 and step 8.
  * Numeric  integers only, bit-exact on every target. Step 1: the model rounded half up to 1/16 px. A grid adds the
