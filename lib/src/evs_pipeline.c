@@ -231,6 +231,21 @@ static bool fill_block(evs_pipeline_t *p)
     return true;
 }
 
+/* Copy events while their times do not run back; returns how many. This is every event's way in: the clock's newest time
+ * stays in a register. */
+static size_t copy_forward(evs_clock_t *clock, const evs_event_t *ev, size_t n, evs_event_t *to)
+{
+    uint32_t newest_us = clock->newest_us;
+    size_t k = 0u;
+    while ((k < n) && (evs_time_diff_us(ev[k].t_us, newest_us) >= 0)) {
+        newest_us = ev[k].t_us;
+        to[k] = ev[k];
+        k++;
+    }
+    if (k > 0u) { evs_clock_accept(clock, newest_us); }
+    return k;
+}
+
 size_t evs_pipeline_push_events(evs_pipeline_t *p, const evs_event_t *ev, size_t n)
 {
     EVS_ASSERT((p != NULL) && ((ev != NULL) || (n == 0u)));
@@ -238,17 +253,22 @@ size_t evs_pipeline_push_events(evs_pipeline_t *p, const evs_event_t *ev, size_t
     const size_t used_before = p->fifo_used;
     size_t i = 0u;
     while ((i < n) && !p->restarting && (p->fifo_used < p->cfg.n_fifo)) {
-        const evs_clock_verdict_t verdict = evs_clock_step(&p->clock, ev[i].t_us, true);
-        if (verdict == EVS_CLOCK_RESTART) {
+        /* As many as come next, fit, and lie in one piece of the ring. */
+        const size_t to = wrapped(p, p->fifo_first + p->fifo_used);
+        size_t room = (to < p->fifo_first) ? p->fifo_first - to : p->cfg.n_fifo - to;
+        room = (room < n - i) ? room : n - i;
+        if (!p->clock.started) { evs_clock_accept(&p->clock, ev[i].t_us); }
+        const size_t copied = copy_forward(&p->clock, &ev[i], room, &p->fifo[to]);
+        p->fifo_used += copied;
+        i += copied;
+        if (copied == room) { continue; }
+
+        if (evs_clock_step(&p->clock, ev[i].t_us, true) == EVS_CLOCK_RESTART) {
             evs_count(&p->counts.n_restarts);
             p->restarting = true; /* the event itself comes again, after what is older has been pulled */
-            break;
+        } else {
+            i++; /* counted by the clock, and left out */
         }
-        if (verdict == EVS_CLOCK_FORWARD) {
-            p->fifo[wrapped(p, p->fifo_first + p->fifo_used)] = ev[i];
-            p->fifo_used++;
-        }
-        i++;
     }
     evs_count_add(&p->counts.n_events, p->fifo_used - used_before);
     return i;

@@ -35,6 +35,14 @@ static void test_one_wild_time_ahead_silences_the_stream_only_briefly(void)
     TEST_ASSERT_EQUAL_UINT32(EVS_CLOCK_RESTART_AFTER, watch.n_back);
 }
 
+static void test_accepted_time_is_the_newest_whatever_came_before(void)
+{
+    (void)evs_clock_step(&watch, 1000u, false);
+    evs_clock_accept(&watch, 0x90000000u); /* a jump that a single step would take for one back */
+    TEST_ASSERT_EQUAL_INT(EVS_CLOCK_FORWARD, evs_clock_step(&watch, 0x90000001u, false));
+    TEST_ASSERT_EQUAL_INT(EVS_CLOCK_BACK, evs_clock_step(&watch, 0x8FFFFFFFu, false));
+}
+
 static void test_scattered_old_times_never_restart_the_clock(void)
 {
     (void)evs_clock_step(&watch, 100000u, false);
@@ -53,6 +61,7 @@ int main(void)
     RUN_TEST(test_ascending_times_pass_across_the_wrap);
     RUN_TEST(test_equal_times_pass_only_where_allowed);
     RUN_TEST(test_one_wild_time_ahead_silences_the_stream_only_briefly);
+    RUN_TEST(test_accepted_time_is_the_newest_whatever_came_before);
     RUN_TEST(test_scattered_old_times_never_restart_the_clock);
     return UNITY_END();
 }

@@ -39,14 +39,20 @@ typedef struct { /** Context; zero-initialize it. Every member is private. */
 /** What is left to judge of a time that is not ahead; part of evs_clock_step(). */
 evs_clock_verdict_t evs_clock_refuse(evs_clock_t *clock, uint32_t t_us);
 
+/** Take a time as the newest without judging it: for a loop that has compared each with the one before itself. */
+static inline void evs_clock_accept(evs_clock_t *clock, uint32_t t_us)
+{
+    clock->started = true;
+    clock->newest_us = t_us;
+    clock->n_refused_run = 0u;
+}
+
 /** Judge the next time of a stream. @param equal_ok  Whether a time equal to the newest is accepted. */
 static inline evs_clock_verdict_t evs_clock_step(evs_clock_t *clock, uint32_t t_us, bool equal_ok)
 {
     const int32_t ahead_us = evs_time_diff_us(t_us, clock->newest_us);
     if ((ahead_us > 0) || (equal_ok && (ahead_us == 0)) || !clock->started) {
-        clock->started = true;
-        clock->newest_us = t_us;
-        clock->n_refused_run = 0u;
+        evs_clock_accept(clock, t_us);
         return EVS_CLOCK_FORWARD;
     }
     return evs_clock_refuse(clock, t_us);
