@@ -46,6 +46,7 @@ install_missing() {
     need_package zlib1g-dev   # evstab reads .gz
     need_package libyaml-dev  # evstab reads the settings of the paper's code
     need_package libcjson-dev # and writes summary.json
+    for p in libpng-dev libjpeg-dev; do need_package "$p"; done # evstab sim reads textures and writes frames
     # The emulated targets. picolibc is for the tests on them: the library needs no C library.
     need arm-none-eabi-gcc gcc-arm-none-eabi
     need riscv64-unknown-elf-gcc gcc-riscv64-unknown-elf

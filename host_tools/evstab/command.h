@@ -16,5 +16,6 @@ int evt_attitude_main(int argc, char **argv);
 int evt_info_main(int argc, char **argv);
 int evt_lut_main(int argc, char **argv);
 int evt_replay_main(int argc, char **argv);
+int evt_sim_main(int argc, char **argv);
 
 #endif

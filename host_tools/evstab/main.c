@@ -15,6 +15,7 @@ static const struct {
     {"attitude", "the attitude filter alone, on the samples of an IMU", evt_attitude_main},
     {"lut", "the undistortion table of a camera as a C header for flash", evt_lut_main},
     {"info", "what a file or a folder holds, and what is wrong with it", evt_info_main},
+    {"sim", "simulates an event camera in flight: events, IMU, frames and the truth", evt_sim_main},
 };
 
 static void print_help(FILE *out)

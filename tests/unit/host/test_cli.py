@@ -96,13 +96,13 @@ def recording(name, **files):
 
 def test_usage():
     expect("no command", [], 2, "Usage: evstab")
-    expect("help", ["--help"], 0, ">replay", ">attitude", ">lut", ">info", n_lines=0)
+    expect("help", ["--help"], 0, ">replay", ">attitude", ">lut", ">info", ">sim", n_lines=0)
     expect("version", ["--version"], 0, r">^evstab \d+\.\d+\.\d+$", n_lines=0)
     expect("unknown command", ["frobnicate"], 2, "unknown command 'frobnicate'", n_lines=1)
-    for later in ("demo", "sim", "egomotion", "eval", "convert", "bench", "view", "live"):
+    for later in ("demo", "egomotion", "eval", "convert", "bench", "view", "live"):
         expect("a command that is not there yet", [later], 2, f"unknown command '{later}'", n_lines=1)
         check("help lists only what exists", f"  {later} " not in run("--help").stdout, later)
-    for command in ("replay", "attitude", "lut", "info"):
+    for command in ("replay", "attitude", "lut", "info", "sim"):
         expect(f"{command} --help", [command, "--help"], 0, f">Usage: evstab {command}", ">Exit status", n_lines=0)
         expect(f"{command} without input", [command], 2, f"evstab {command}: ", f"evstab {command} --help", n_lines=1)
         expect(f"{command} --what", [command, "x", "--what"], 2, "unknown option '--what'", n_lines=1)
