@@ -16,7 +16,7 @@
 #define SKY_OVERLAP     1.1 /* The texture of a face reaches beyond it: no seam where it would repeat. */
 #define EYE_HEIGHT_M    1.4
 #define FACES           6u
-#define LOG2_TEXELS_MIN 8u
+#define LOG2_TEXELS_MIN 6u
 
 /* A texture to compute, row by row. */
 typedef struct {

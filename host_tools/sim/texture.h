@@ -69,7 +69,7 @@ static inline float evsim_texture_sample(const evsim_texture_t *t, float u, floa
     memcpy(&bits, &footprint2, sizeof bits);
     lod = 0.5f * ((float)bits * (1.0f / 8388608.0f) - 127.0f);
     level = (int)lod;
-    if (level >= (int)t->log2_size) { return t->level[t->log2_size][0]; }
+    if ((level >= (int)EVSIM_TEXTURE_LOG2_MAX) || (level >= (int)t->log2_size)) { return t->level[t->log2_size][0]; }
     part = lod - (float)level;
     bits = (127u - (uint32_t)level) << 23; /* 2^-level */
     memcpy(&scale, &bits, sizeof scale);
