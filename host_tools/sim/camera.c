@@ -123,7 +123,6 @@ static bool fill_rays(evsim_camera_t *c, const evh_calib_t *calib, evh_error_t *
             c->ray_x[i] = (float)ray[0];
             c->ray_y[i] = (float)ray[1];
             c->pitch[i] = (float)pitch;
-            if (pitch < c->pitch_min) { c->pitch_min = pitch; }
         }
     }
     return true;
@@ -177,7 +176,6 @@ bool evsim_camera_init(evsim_camera_t *camera, const evh_calib_t *calib, evh_err
     camera->height_px = calib->height_px;
     camera->n_tiles_x = (camera->width_px + EVSIM_TILE_W - 1u) / EVSIM_TILE_W;
     camera->n_bands = (camera->height_px + EVSIM_TILE_H - 1u) / EVSIM_TILE_H;
-    camera->pitch_min = INFINITY;
     camera->ray_x = malloc(n * sizeof *camera->ray_x);
     camera->ray_y = malloc(n * sizeof *camera->ray_y);
     camera->pitch = malloc(n * sizeof *camera->pitch);

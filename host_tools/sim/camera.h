@@ -41,7 +41,6 @@ typedef struct {
     evsim_tile_t *tile;
     evsim_probe_t probe[EVSIM_PROBES_MAX];
     unsigned n_probes;
-    double pitch_min;
 } evsim_camera_t;
 
 /** Free with evsim_camera_free(), also after a failure. */

@@ -49,8 +49,8 @@ static void build(evsim_scene_kind_t kind, uint64_t seed)
 static double cast(const evsim_state_t *state, double x, double y, double *margin_m)
 {
     const evsim_vec_t d = evsim_rotate(&state->r_wc, evsim_vec(x, y, 1.0));
-    double nearest = INFINITY;
-    *margin_m = INFINITY; /* How near the ray passes an edge: there the two may differ. */
+    double nearest = HUGE_VAL;
+    *margin_m = HUGE_VAL; /* How near the ray passes an edge: there the two may differ. */
     for (unsigned i = 0u; i < scene->n_surfaces; i++) {
         const evsim_surface_t *const s = &scene->surface[i];
         const evsim_vec_t n = evsim_cross(s->u, s->v);
