@@ -84,8 +84,8 @@ static double stones(uint64_t seed, double u, double v)
     }
     {
         const double stone =
-            between(0.15, 0.85, chance(seed, 3u, id)) * between(0.7, 1.15, noise_octaves(seed, 10u, u, v, 16, 3));
-        return between(0.06, stone, step_between(0.02, 0.07, near2 - near1));
+            between(0.2, 0.8, chance(seed, 3u, id)) * between(0.7, 1.15, noise_octaves(seed, 10u, u, v, 16, 3));
+        return between(0.12, stone, step_between(0.02, 0.07, near2 - near1));
     }
 }
 
@@ -100,13 +100,13 @@ static double bricks(uint64_t seed, double u, double v)
     const double dy = fmin(y - row, row + 1.0 - y) / ROWS;
     const uint64_t id = (uint64_t)wrap(row, ROWS) * COLUMNS + wrap(column, COLUMNS);
     const double brick =
-        between(0.12, 0.5, chance(seed, 1u, id)) * between(0.65, 1.3, noise_octaves(seed, 10u, u, v, 24, 3));
-    return between(0.65, brick, step_between(0.004, 0.009, fmin(dx, dy)));
+        between(0.24, 0.48, chance(seed, 1u, id)) * between(0.75, 1.2, noise_octaves(seed, 10u, u, v, 24, 3));
+    return between(0.58, brick, step_between(0.004, 0.009, fmin(dx, dy)));
 }
 
 static double clouds(uint64_t seed, double u, double v)
 {
-    return between(0.1, 0.9, step_between(0.2, 0.8, noise_octaves(seed, 1u, u, v, 4, 4)));
+    return between(0.15, 0.85, step_between(0.2, 0.8, noise_octaves(seed, 1u, u, v, 4, 4)));
 }
 
 static double tiles(uint64_t seed, double u, double v)
@@ -118,7 +118,7 @@ static double tiles(uint64_t seed, double u, double v)
     const double dy = fmin(v * N - j, j + 1.0 - v * N);
     const uint64_t id = (uint64_t)wrap(j, N) * N + wrap(i, N);
     const double base =
-        (((i + j) & 1) != 0) ? between(0.55, 0.9, chance(seed, 1u, id)) : between(0.08, 0.35, chance(seed, 1u, id));
+        (((i + j) & 1) != 0) ? between(0.5, 0.8, chance(seed, 1u, id)) : between(0.15, 0.4, chance(seed, 1u, id));
     const double tile = base * between(0.85, 1.1, noise_octaves(seed, 10u, u, v, 20, 2));
     return between(0.3, tile, step_between(0.02, 0.06, fmin(dx, dy)));
 }
@@ -178,7 +178,7 @@ static double collage(uint64_t seed, double u, double v)
         turn = 2.0 * EVSIM_PI * chance(seed, i, 3u);
         if (shape(evsim_bits(seed, EVSIM_STREAM_PATTERN, i, 4u), dx * cos(turn) + dy * sin(turn),
                   dy * cos(turn) - dx * sin(turn)) < 0.0) {
-            value = between(0.05, 0.95, chance(seed, i, 5u));
+            value = between(0.1, 0.9, chance(seed, i, 5u));
         }
     }
     return value * between(0.8, 1.05, noise_octaves(seed, 100u, u, v, 24, 3));
@@ -193,8 +193,8 @@ static double planks(uint64_t seed, double u, double v)
     const double end = around(v, chance(seed, 2u, id)); /* Where one plank ends and the next begins. */
     const double edge = fmin(fmin(x - i, i + 1.0 - x) / N, fabs(end));
     const double grain = 0.6 * noise(seed, 20u + id, u, v, 90, 5) + 0.4 * noise(seed, 40u + id, u, v, 180, 12);
-    const double wood = between(0.2, 0.75, chance(seed, (end < 0.0) ? 1u : 3u, id)) * between(0.55, 1.2, grain);
-    return between(0.04, wood, step_between(0.002, 0.006, edge));
+    const double wood = between(0.25, 0.7, chance(seed, (end < 0.0) ? 1u : 3u, id)) * between(0.7, 1.15, grain);
+    return between(0.1, wood, step_between(0.002, 0.006, edge));
 }
 
 /* Lines of glyph-like 5x7 blocks, some lines larger, some left out. */
@@ -212,7 +212,7 @@ static double print(uint64_t seed, double u, double v)
     const double paper = between(0.82, 0.93, noise(seed, 9u, u, v, 6, 6));
     if ((in_line > 1.0) || (in_glyph > 1.0) || (chance(seed, 100u + line, 1000u + glyph) < 0.18)) { return paper; }
     return (chance(seed, 200u + line * 64u + glyph, (uint64_t)(in_line * 7.0) * 5u + (uint64_t)(in_glyph * 5.0)) < 0.5)
-               ? 0.07
+               ? 0.12
                : paper;
 }
 
@@ -221,7 +221,7 @@ static double spots(uint64_t seed, double u, double v)
     const double coarse = noise_octaves(seed, 1u, u, v, 6, 2);
     const double fine = noise_octaves(seed, 10u, u, v, 11, 2);
     const double base = between(0.2, 0.6, step_between(0.48, 0.5, coarse));
-    return between(base, (coarse > 0.55) ? 0.05 : 0.92, step_between(0.64, 0.66, fine)) *
+    return between(base, (coarse > 0.55) ? 0.1 : 0.85, step_between(0.64, 0.66, fine)) *
            between(0.9, 1.05, noise(seed, 20u, u, v, 60, 60));
 }
 
@@ -282,21 +282,37 @@ float evsim_pattern_at(evsim_pattern_t pattern, uint64_t seed, double u, double 
 /* Cells of a jittered lattice in space, cut by the sphere: patches with straight borders, as fields seen from above. */
 static double sky_cells(uint64_t seed, const double d[3], double density, double *border)
 {
-    double near1 = 9.0;
-    double near2 = 9.0;
+    /* The own cell first, then those at a face, an edge, a corner: most of the later ones are too far to matter. */
+    static const signed char ORDER[27][3] = {
+        {0, 0, 0},   {-1, 0, 0},  {1, 0, 0},   {0, -1, 0}, {0, 1, 0},   {0, 0, -1},   {0, 0, 1},
+        {-1, -1, 0}, {-1, 1, 0},  {1, -1, 0},  {1, 1, 0},  {-1, 0, -1}, {-1, 0, 1},   {1, 0, -1},
+        {1, 0, 1},   {0, -1, -1}, {0, -1, 1},  {0, 1, -1}, {0, 1, 1},   {-1, -1, -1}, {-1, -1, 1},
+        {-1, 1, -1}, {-1, 1, 1},  {1, -1, -1}, {1, -1, 1}, {1, 1, -1},  {1, 1, 1}};
+    double near1 = 99.0; /* Squares. */
+    double near2 = 99.0;
     double value = 0.0;
     int base[3];
-    for (int i = 0; i < 3; i++) { base[i] = (int)floor(d[i] * density); }
+    double part[3];
+    for (int i = 0; i < 3; i++) {
+        base[i] = (int)floor(d[i] * density);
+        part[i] = d[i] * density - base[i];
+    }
     for (int k = 0; k < 27; k++) {
-        const int c[3] = {base[0] + k % 3 - 1, base[1] + k / 3 % 3 - 1, base[2] + k / 9 - 1};
-        const uint64_t id = ((uint64_t)(unsigned)(c[0] + 512) << 40) | ((uint64_t)(unsigned)(c[1] + 512) << 20) |
-                            (unsigned)(c[2] + 512);
-        const uint64_t bits =
-            evsim_bits(seed, EVSIM_STREAM_PATTERN, id, 0u); /* 16 for each of x, y, z and the value. */
-        const double dx = c[0] + (double)(bits & 0xFFFFu) / 65536.0 - d[0] * density;
-        const double dy = c[1] + (double)((bits >> 16) & 0xFFFFu) / 65536.0 - d[1] * density;
-        const double dz = c[2] + (double)((bits >> 32) & 0xFFFFu) / 65536.0 - d[2] * density;
-        const double distance = sqrt(dx * dx + dy * dy + dz * dz);
+        double at_least = 0.0;
+        double distance = 0.0;
+        uint64_t id = 0u;
+        uint64_t bits;
+        for (int i = 0; i < 3; i++) {
+            const double gap = (ORDER[k][i] < 0) ? part[i] : ((ORDER[k][i] > 0) ? 1.0 - part[i] : 0.0);
+            at_least += gap * gap;
+            id = (id << 20) | (unsigned)(base[i] + ORDER[k][i] + 512);
+        }
+        if (at_least >= near2) { continue; }
+        bits = evsim_bits(seed, EVSIM_STREAM_PATTERN, id, 0u); /* 16 for each of x, y, z and the value. */
+        for (int i = 0; i < 3; i++) {
+            const double delta = ORDER[k][i] + (double)((bits >> (16 * i)) & 0xFFFFu) / 65536.0 - part[i];
+            distance += delta * delta;
+        }
         if (distance < near1) {
             near2 = near1;
             near1 = distance;
@@ -305,7 +321,7 @@ static double sky_cells(uint64_t seed, const double d[3], double density, double
             near2 = distance;
         }
     }
-    *border = near2 - near1;
+    *border = sqrt(near2) - sqrt(near1);
     return value;
 }
 
