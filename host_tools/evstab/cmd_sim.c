@@ -227,6 +227,7 @@ static bool take_frames(evsim_settings_t *s)
 
 static bool take_pixels(evsim_settings_t *s)
 {
+    const double n_pixels = (double)s->calib.width_px * (double)s->calib.height_px;
     double number[NUMBERS_MAX];
     size_t n;
     if (opt.contrast != NULL) {
@@ -242,10 +243,11 @@ static bool take_pixels(evsim_settings_t *s)
     }
     if (opt.hot != NULL) {
         n = parse_numbers(opt.hot, number, 2u);
-        if ((n != 2u) || !(number[0] >= 0.0) || !(number[0] <= 4194304.0) || (number[0] != floor(number[0])) ||
+        if ((n != 2u) || !(number[0] >= 0.0) || !(number[0] <= n_pixels) || (number[0] != floor(number[0])) ||
             !(number[1] >= 0.0) || !(number[1] <= 1e5)) {
-            (void)evt_usage_error(&USAGE, "--hot is '%s'; expected how many and their rate in Hz, such as 5,200",
-                                  opt.hot);
+            (void)evt_usage_error(&USAGE,
+                                  "--hot is '%s'; expected how many (of %g pixels) and their rate in Hz, such as 5,200",
+                                  opt.hot, n_pixels);
             return false;
         }
         s->n_hot = (uint32_t)number[0];

@@ -277,6 +277,7 @@ class Runs(unittest.TestCase):
         for args in (["cave"], ["room", "--motion", "crawl"], ["room", "--duration", "0"], ["room", "--duration", "x"],
                      ["room", "--duration", "nan"], ["room", "--size", "5000x10"], ["room", "--contrast", "0"],
                      ["room", "--contrast", "0.1,0.2,0.3"], ["room", "--hot", "3"], ["room", "--hot", "1.5,3"],
+                     ["room", "--size", "4x4", "--hot", "17,3"],
                      ["room", "--imu-range", "1"], ["room", "--gyro-bias", "1,2"], ["room", "--gyro-bias", "1e9"],
                      ["room", "--fps", "200"] + ["--exposure", "0.01"], ["room", "--jobs", "0"], ["room", "--fx", "0"],
                      ["room", "--noise-hz", "-1"], ["room", "--seed", "-1"], ["room", "--nonsense"], ["room", "poster"],
