@@ -200,12 +200,12 @@ static double planks(uint64_t seed, double u, double v)
 /* Lines of glyph-like 5x7 blocks, some lines larger, some left out. */
 static double print(uint64_t seed, double u, double v)
 {
-    enum { LINES = 18 };
+    enum { LINES = 10 };
     const double y = v * LINES;
     const uint64_t line = wrap((int)floor(y), LINES);
-    const bool large = (line % 6u) == 0u;
+    const bool large = (line % 5u) == 0u;
     const double in_line = (y - floor(y)) / (large ? 0.9 : 0.65);
-    const int glyphs = large ? 24 : 40;
+    const int glyphs = large ? 12 : 20;
     const double x = u * glyphs;
     const uint64_t glyph = wrap((int)floor(x), glyphs);
     const double in_glyph = (x - floor(x)) / 0.8;
