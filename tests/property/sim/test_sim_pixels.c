@@ -99,7 +99,7 @@ static void test_refractory_period_keeps_events_apart(void)
 {
     uint32_t last[N];
     settings.refractory_us = 350;
-    settings.noise_hz = 2000.0;
+    settings.noise_hz = 20000.0; /* Every gap is tried, also one microsecond too short. */
     start(-3.0);
     for (int i = 0; i < N; i++) { last[i] = 0x80000000u; }
     step(0.0, 0, 5000000);

@@ -125,6 +125,53 @@ static void test_a_pixel_shows_the_point_of_the_texture_that_its_ray_meets(void)
     TEST_ASSERT_TRUE(n_checked > 10000u);
 }
 
+/* Where the point that a ray meets is a moment later: how far its image has moved, in pixels. */
+static double moved_px(const evsim_state_t *from, const evsim_state_t *to, double x, double y)
+{
+    double margin_m;
+    const double z = cast(from, x, y, &margin_m);
+    const evsim_vec_t p = evsim_add(from->p_w_m, evsim_rotate(&from->r_wc, evsim_vec(x * z, y * z, z)));
+    const evsim_vec_t q = evsim_rotate_back(&to->r_wc, evsim_sub(p, to->p_w_m));
+    double a[2];
+    double b[2];
+    evsim_distort(&settings.calib, x, y, a, NULL);
+    evsim_distort(&settings.calib, q.v[0] / q.v[2], q.v[1] / q.v[2], b, NULL);
+    return settings.calib.fx_px * hypot(a[0] - b[0], a[1] - b[1]);
+}
+
+static double fastest_px_s(double t_s)
+{
+    const double h_s = 1e-5;
+    evsim_state_t from;
+    evsim_state_t to;
+    double fastest = 0.0;
+    evsim_motion_at(&motion, t_s, &from);
+    evsim_motion_at(&motion, t_s + h_s, &to);
+    for (unsigned i = 0u; i < camera.n_probes; i++) {
+        fastest = fmax(fastest, moved_px(&from, &to, camera.probe[i].x, camera.probe[i].y) / h_s);
+    }
+    return fastest;
+}
+
+static void test_image_speed_is_that_of_the_points_seen(void)
+{
+    evsim_schedule_t schedule;
+    evsim_batch_t *const batch = malloc(sizeof *batch);
+    TEST_ASSERT_NOT_NULL(batch);
+    build(EVSIM_SCENE_ROOM, 2u);
+    settings.duration_us = 1000000;
+    settings.fps_hz = 500.0; /* A batch ends with a frame: many looks. */
+    settings.exposure_us = 1000;
+    evsim_schedule_init(&schedule, &settings, &motion, scene, &camera);
+    TEST_ASSERT_TRUE_MESSAGE(evsim_schedule_start(&schedule, &view, &err), err.text);
+    do {
+        const double want = fastest_px_s((double)schedule.t_ns * 1e-9);
+        TEST_ASSERT_DOUBLE_WITHIN(0.002 * want, want, schedule.speed_px_s);
+        TEST_ASSERT_TRUE_MESSAGE(evsim_schedule_next(&schedule, batch, &err), err.text);
+    } while (batch->n > 0u);
+    free(batch);
+}
+
 static void test_renders_are_no_further_apart_than_half_a_pixel(void)
 {
     evsim_schedule_t schedule;
@@ -147,18 +194,8 @@ static void test_renders_are_no_further_apart_than_half_a_pixel(void)
             last_ns = batch->render[k].t1_ns;
             evsim_motion_at(&motion, (double)batch->render[k].t0_ns * 1e-9, &from);
             evsim_motion_at(&motion, (double)last_ns * 1e-9, &to);
-            for (unsigned i = 0u; i < camera.n_probes; i += 7u) { /* Follow the point that the ray meets. */
-                double margin_m;
-                const double x = camera.probe[i].x;
-                const double y = camera.probe[i].y;
-                const double z = cast(&from, x, y, &margin_m);
-                const evsim_vec_t p = evsim_add(from.p_w_m, evsim_rotate(&from.r_wc, evsim_vec(x * z, y * z, z)));
-                const evsim_vec_t q = evsim_rotate_back(&to.r_wc, evsim_sub(p, to.p_w_m));
-                double a[2];
-                double b[2];
-                evsim_distort(&settings.calib, x, y, a, NULL);
-                evsim_distort(&settings.calib, q.v[0] / q.v[2], q.v[1] / q.v[2], b, NULL);
-                worst = fmax(worst, settings.calib.fx_px * hypot(a[0] - b[0], a[1] - b[1]));
+            for (unsigned i = 0u; i < camera.n_probes; i += 7u) {
+                worst = fmax(worst, moved_px(&from, &to, camera.probe[i].x, camera.probe[i].y));
             }
         }
     }
@@ -172,6 +209,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_depth_is_that_of_the_nearest_plane);
     RUN_TEST(test_a_pixel_shows_the_point_of_the_texture_that_its_ray_meets);
+    RUN_TEST(test_image_speed_is_that_of_the_points_seen);
     RUN_TEST(test_renders_are_no_further_apart_than_half_a_pixel);
     return UNITY_END();
 }
