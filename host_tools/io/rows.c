@@ -30,12 +30,13 @@ static const struct {
     {"pz", EVH_Q_PZ},       {"tx", EVH_Q_PX},       {"ty", EVH_Q_PY},       {"tz", EVH_Q_PZ},
     {"p_rs_r_x", EVH_Q_PX}, {"p_rs_r_y", EVH_Q_PY}, {"p_rs_r_z", EVH_Q_PZ}, {"qw", EVH_Q_QW},
     {"qx", EVH_Q_QX},       {"qy", EVH_Q_QY},       {"qz", EVH_Q_QZ},       {"q_rs_w", EVH_Q_QW},
-    {"q_rs_x", EVH_Q_QX},   {"q_rs_y", EVH_Q_QY},   {"q_rs_z", EVH_Q_QZ},
+    {"q_rs_x", EVH_Q_QX},   {"q_rs_y", EVH_Q_QY},   {"q_rs_z", EVH_Q_QZ},   {"vx", EVH_Q_VX},
+    {"vy", EVH_Q_VY},       {"vz", EVH_Q_VZ},
 };
 
 static const char *const QUANTITY_NAMES[EVH_Q_COUNT] = {
-    "t_s",   "gx_rad_s", "gy_rad_s", "gz_rad_s", "ax_m_s2", "ay_m_s2", "az_m_s2", "mx_ut", "my_ut",
-    "mz_ut", "px",       "py",       "pz",       "qw",      "qx",      "qy",      "qz"};
+    "t_s", "gx_rad_s", "gy_rad_s", "gz_rad_s", "ax_m_s2", "ay_m_s2", "az_m_s2", "mx_ut", "my_ut", "mz_ut",
+    "px",  "py",       "pz",       "qw",       "qx",      "qy",      "qz",      "vx",    "vy",    "vz"};
 
 static bool is_blank(char c) { return (c == ' ') || (c == '\t') || (c == '\r'); }
 static char lower(char c) { return ((c >= 'A') && (c <= 'Z')) ? (char)(c - 'A' + 'a') : c; }

@@ -33,6 +33,9 @@ typedef enum {
     EVH_Q_QX,
     EVH_Q_QY,
     EVH_Q_QZ,
+    EVH_Q_VX,
+    EVH_Q_VY,
+    EVH_Q_VZ, /**< m/s, or a direction */
     EVH_Q_COUNT,
     EVH_Q_SKIP = EVH_Q_COUNT /**< A column that nobody reads. */
 } evh_quantity_t;
