@@ -13,9 +13,11 @@ static const struct {
 } COMMANDS[] = {
     {"replay", "a recording through the library: stabilized events, windows, attitude", evt_replay_main},
     {"attitude", "the attitude filter alone, on the samples of an IMU", evt_attitude_main},
+    {"eval", "what a run found against the truth: attitude, velocity, sharpness", evt_eval_main},
     {"lut", "the undistortion table of a camera as a C header for flash", evt_lut_main},
     {"info", "what a file or a folder holds, and what is wrong with it", evt_info_main},
     {"sim", "simulates an event camera in flight: events, IMU, frames and the truth", evt_sim_main},
+    {"bench", "how fast the library is on this computer, step by step", evt_bench_main},
 };
 
 static void print_help(FILE *out)
