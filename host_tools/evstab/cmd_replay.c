@@ -8,14 +8,19 @@
 #include "command.h"
 #include "decimal.h"
 #include "faults.h"
+#include "jobs.h"
 #include "options.h"
 #include "replay.h"
+#include "replay_batch.h"
 
 static evt_replay_options_t opt;
+static const char *opt_jobs;
 static bool opt_quiet;
 
 static const evt_option_t OPTIONS[] = {
     {"output", 'o', "DIR", "Folder for the results; made if need be. Needed.", &opt.output, NULL},
+    {"jobs", 'j', "N", "Of several recordings replay N at a time. Default: as many\nas there are processors.",
+     &opt_jobs, NULL},
     {"attitude", '\0', "SOURCE",
      "imu: filter on gyro and accelerometer; gyro: integration alone;\n"
      "truth: the recorded poses; none: no rotation.\n"
@@ -60,18 +65,22 @@ static const evt_option_t OPTIONS[] = {
 
 static const evt_usage_t USAGE = {
     .command = "replay",
-    .synopsis = "INPUT -o DIR [options]",
+    .synopsis = "INPUT... -o DIR [options]",
     .about = "Replays a recording through the library. INPUT is a folder in ECD form (events.txt imu.txt "
              "groundtruth.txt calib.txt,\n"
              "each also .gz) or one event file (\"t x y p\" lines); files outside of it are named by options.\n"
              "Writes into DIR: summary.json, attitude.csv (world from camera, per sample), windows.csv, and events.csv "
-             "on demand.",
+             "on demand.\n"
+             "Several INPUTs: each is replayed by a process of its own into DIR/NAME, with what it had to say in "
+             "log.txt;\n"
+             "DIR/summary.csv has a row for each. Exit status 1 if any of them failed.",
     .examples = "  evstab replay slider_depth -o out\n"
-                "  evstab replay events_02.097-02.196.txt --calib calib.txt --imu imu.txt -o out --write events",
+                "  evstab replay events_02.097-02.196.txt --calib calib.txt --imu imu.txt -o out --write events\n"
+                "  evstab replay recordings/* -o out -j 4",
     .options = OPTIONS,
     .n_options = sizeof OPTIONS / sizeof OPTIONS[0],
     .n_words_min = 1u,
-    .n_words_max = 1u,
+    .n_words_max = EVT_BATCH_MAX,
 };
 
 static void report_unoriented(const evt_replay_result_t *x)
@@ -139,18 +148,15 @@ static int replay(const evt_replay_t *r)
     return EVT_EXIT_OK;
 }
 
-int evt_replay_main(int argc, char **argv)
+/* One recording, after the words of the command line have been taken. */
+static int replay_one(const char *input, const char *output)
 {
-    const char *words[1];
     evt_replay_t r;
     evh_error_t err = {""};
     bool usage_fault = false;
     int status = EVT_EXIT_OK;
-
-    if (!evt_options_parse(&USAGE, argc, argv, words, &status)) { return status; }
-    opt.input = words[0];
-    if (opt.output == NULL) { return evt_usage_error(&USAGE, "-o DIR is missing: where the results shall go"); }
-    evh_set_quiet(opt_quiet);
+    opt.input = input;
+    opt.output = output;
     if (!evt_replay_settle(&r, &opt, &usage_fault, &err)) {
         status = EVT_EXIT_FAILED;
         if (usage_fault) {
@@ -163,4 +169,43 @@ int evt_replay_main(int argc, char **argv)
     }
     evt_replay_free(&r);
     return status;
+}
+
+/* A wrong word is told once, before anything is started, and not in the log of every recording. The first recording
+ * that has what it takes shows them all. */
+static bool words_are_right(const char *const *inputs, size_t n, int *status)
+{
+    bool decided = false;
+    *status = EVT_EXIT_OK;
+    evh_set_quiet(true);
+    for (size_t i = 0u; (i < n) && !decided; i++) {
+        evt_replay_t r;
+        evh_error_t err = {""};
+        bool usage_fault = false;
+        opt.input = inputs[i];
+        decided = evt_replay_settle(&r, &opt, &usage_fault, &err) || usage_fault;
+        if (usage_fault) { *status = evt_usage_error(&USAGE, "%s", err.text); }
+        evt_replay_free(&r);
+    }
+    evh_set_quiet(opt_quiet);
+    return *status == EVT_EXIT_OK;
+}
+
+int evt_replay_main(int argc, char **argv)
+{
+    static const char *words[EVT_BATCH_MAX];
+    int64_t n_jobs = evb_n_processors();
+    size_t n = 0u;
+    int status = EVT_EXIT_OK;
+
+    if (!evt_options_parse(&USAGE, argc, argv, words, &status)) { return status; }
+    while ((n < EVT_BATCH_MAX) && (words[n] != NULL)) { n++; }
+    if (opt.output == NULL) { return evt_usage_error(&USAGE, "-o DIR is missing: where the results shall go"); }
+    if ((opt_jobs != NULL) && !evt_parse_int(opt_jobs, 1, EVT_BATCH_PARALLEL_MAX, &n_jobs)) {
+        return evt_usage_error(&USAGE, "--jobs is '%s'; expected 1 .. %d", opt_jobs, EVT_BATCH_PARALLEL_MAX);
+    }
+    evh_set_quiet(opt_quiet);
+    if (n == 1u) { return replay_one(words[0], opt.output); }
+    if (!words_are_right(words, n, &status)) { return status; }
+    return evt_replay_batch(words, n, opt.output, (unsigned)n_jobs, replay_one);
 }
