@@ -256,7 +256,9 @@ static bool eval_velocity(const evt_eval_t *e, const run_t *run, const evh_poses
     } else if (ok && !evl_velocity_compare(&est, &truth, e->from_us, e->to_us, &x->velocity)) {
         ok = evh_fail(err, "out of memory");
     } else if (ok && (x->velocity.error_deg.n == 0u)) {
-        if (x->velocity.n_slow > 0u) {
+        if (x->velocity.n_estimates == 0u) {
+            evh_note("velocity.csv holds no estimate between --from and --to");
+        } else if (x->velocity.n_slow > 0u) {
             evh_note("velocity.csv: nothing to compare, the camera does not move");
         } else {
             const bool from_table = (truth.table != NULL);

@@ -99,15 +99,16 @@ def test_usage():
     expect("help", ["--help"], 0, ">replay", ">attitude", ">lut", ">info", ">sim", n_lines=0)
     expect("version", ["--version"], 0, r">^evstab \d+\.\d+\.\d+$", n_lines=0)
     expect("unknown command", ["frobnicate"], 2, "unknown command 'frobnicate'", n_lines=1)
-    for later in ("demo", "egomotion", "eval", "convert", "bench", "view", "live"):
+    for later in ("demo", "egomotion", "convert", "view", "live"):
         expect("a command that is not there yet", [later], 2, f"unknown command '{later}'", n_lines=1)
         check("help lists only what exists", f"  {later} " not in run("--help").stdout, later)
     for command in ("replay", "attitude", "lut", "info", "sim"):
         expect(f"{command} --help", [command, "--help"], 0, f">Usage: evstab {command}", ">Exit status", n_lines=0)
         expect(f"{command} without input", [command], 2, f"evstab {command}: ", f"evstab {command} --help", n_lines=1)
         expect(f"{command} --what", [command, "x", "--what"], 2, "unknown option '--what'", n_lines=1)
-        expect(f"{command} a b", [command, "a", "b", "-o", "x"] if command != "info" else [command, "a", "b"], 2,
-               "one word too many: 'b'", n_lines=1)
+        if command != "replay":  # which takes several: tests/golden/batch.py
+            expect(f"{command} a b", [command, "a", "b", "-o", "x"] if command != "info" else [command, "a", "b"], 2,
+                   "one word too many: 'b'", n_lines=1)
     for later in ("--image=iwe", "--warp=tiled", "--velocity=on", "--video=a.mp4", "--writ=events", "--i"):
         expect("an option of a later module", ["replay", "x", "-o", "y", later], 2, "unknown option", n_lines=1)
     for option, value in (("--window", "area:34x26"), ("--window", "count:0"), ("--window", "time:1.5"), ("--window", "roi:1"),
