@@ -22,6 +22,12 @@ evl_quat_t evl_align_apply(const evl_align_t *align, evl_quat_t ref)
     return evl_quat_mul(evl_quat_mul(align->left, ref), align->right);
 }
 
+bool evl_align_is_told(const evl_align_t *align, double rmse_rad)
+{
+    return (align->kind != EVL_ALIGN_FULL) || ((align->spread_rad >= EVL_ALIGN_SPREAD_MIN_RAD) &&
+                                               (align->spread_rad >= EVL_ALIGN_SPREAD_PER_RMSE * rmse_rad));
+}
+
 /* The last second of rest before the truth starts to turn, else the first second. */
 static void choose_second(evl_align_t *a, const evl_pair_t *pair, size_t n)
 {

@@ -40,11 +40,16 @@ typedef struct {
     double spread_rad;      /**< FULL: how far the motion turns, rms about the axis that it turns about least. */
 } evl_align_t;
 
-/** FULL needs at least this; with less, `left` and `right` cannot be told apart. */
-#define EVL_ALIGN_SPREAD_MIN_RAD 0.02
+/** FULL: the motion must turn at least this far about every axis, and further than the estimate errs by this factor;
+ * otherwise the errors decide what is found, and `left` and `right` cannot be told apart. */
+#define EVL_ALIGN_SPREAD_MIN_RAD  0.02
+#define EVL_ALIGN_SPREAD_PER_RMSE 3.0
 
 /** @param n  At least 1. */
 evl_align_t evl_align(evl_align_kind_t kind, const evl_pair_t *pair, size_t n);
+
+/** Whether the motion told what FULL was to find. @param rmse_rad  What is left after the alignment. */
+bool evl_align_is_told(const evl_align_t *align, double rmse_rad);
 
 /** The truth as the estimate would see it: left . ref . right. */
 evl_quat_t evl_align_apply(const evl_align_t *align, evl_quat_t ref);

@@ -216,9 +216,11 @@ static bool eval_attitude(const evt_eval_t *e, const run_t *run, const evh_poses
                         truth->pose[0].t_us, truth->pose[truth->n - 1u].t_us, err);
     } else {
         x->has_attitude = true;
-        if ((e->align == EVL_ALIGN_FULL) && (x->attitude.align.spread_rad < EVL_ALIGN_SPREAD_MIN_RAD)) {
-            evh_note("the motion turns too little (%.2f deg about some axis) to tell the mounting from the worlds",
-                     EVL_DEG_PER_RAD * x->attitude.align.spread_rad);
+        if (!evl_align_is_told(&x->attitude.align, x->attitude.total_deg.rmse / EVL_DEG_PER_RAD)) {
+            evh_note(
+                "the motion turns by only %.2f deg about some axis: the mounting that was found is a guess; a longer "
+                "run or --align world tells more",
+                EVL_DEG_PER_RAD * x->attitude.align.spread_rad);
         }
         if (strcmp(x->attitude_source, "truth") == 0) {
             evh_note("this run was replayed with --attitude truth: its attitude is no estimate");

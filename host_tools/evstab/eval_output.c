@@ -169,6 +169,8 @@ static void add_attitude(cJSON *root, const evt_eval_result_t *x)
     }
     if (a->align.kind == EVL_ALIGN_FULL) {
         evt_json_number(align, "spread_deg", EVL_DEG_PER_RAD * a->align.spread_rad);
+        (void)cJSON_AddBoolToObject(align, "mounting_told",
+                                    evl_align_is_told(&a->align, a->total_deg.rmse / EVL_DEG_PER_RAD));
     }
     add_stats(o, "total", &a->total_deg);
     add_stats(o, "inclination", &a->inclination_deg);

@@ -119,7 +119,7 @@ def test_processes():
 def snakemake(config):
     (ROOT / "config.yaml").write_text(config)
     return subprocess.run([sys.executable, "-m", "snakemake", "-s", f"{BATCH}/Snakefile", "--configfile", "config.yaml", "--cores",
-                           "2", "--keep-going", "--quiet", "all"], capture_output=True, text=True, cwd=ROOT, timeout=250,
+                           "2", "--keep-going"], capture_output=True, text=True, cwd=ROOT, timeout=250,
                           env={**os.environ, "XDG_CACHE_HOME": str(ROOT / "cache"), "PYTHONDONTWRITEBYTECODE": "1"})
 
 

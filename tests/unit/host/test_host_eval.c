@@ -202,6 +202,8 @@ static void test_a_full_alignment_finds_worlds_and_mounting(void)
         expect_same_rotation(turn(c[0], c[1], c[2]), a.left, 1e-8);
         expect_same_rotation(turn(c[3], c[4], c[5]), a.right, 1e-8);
         TEST_ASSERT_TRUE(a.spread_rad > 10.0 * RAD);
+        TEST_ASSERT_TRUE(evl_align_is_told(&a, 2.0 * RAD));
+        TEST_ASSERT_FALSE(evl_align_is_told(&a, a.spread_rad / 2.0));
     }
 }
 
@@ -214,7 +216,7 @@ static void test_a_full_alignment_of_a_camera_that_hardly_turns_says_so(void)
         pair[i].est = evl_quat_mul(pair[i].ref, turn(0, 0, 15));
     }
     a = evl_align(EVL_ALIGN_FULL, pair, 500u);
-    TEST_ASSERT_TRUE(a.spread_rad < EVL_ALIGN_SPREAD_MIN_RAD);
+    TEST_ASSERT_FALSE(evl_align_is_told(&a, 0.0));
     /* Which of the two takes the 15 degrees cannot be told; together they must. */
     expect_same_rotation(pair[77].est, evl_align_apply(&a, pair[77].ref), 1e-6);
 }
