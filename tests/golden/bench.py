@@ -48,9 +48,9 @@ def test_usage():
 
 
 def test_figures(folder):
-    for size, n in (("240x180", 200000), ("64x48", 5001)):
+    for size, n in (("240x180", 100000), ("64x48", 5001)):
         path = folder / f"{size}.json"
-        done = run("--size", size, "--events", str(n), "--rounds", "3", "--json", str(path))
+        done = run("--size", size, "--events", str(n), "--rounds", "2", "--json", str(path))
         check(f"{size}: runs", done.returncode == 0 and "ns per event" in done.stdout, done.stderr)
         x = json.loads(path.read_text())
         check(f"{size}: all events kept", x["kept"] == x["events"] == n, x["kept"])

@@ -158,6 +158,10 @@ def test_hand():
     close("mean speed", v["mean_speed_m_s"], 1)
     a = evaluate("run", "--truth", truth, "--ninedof")["attitude"]
     close("nine degrees of freedom: nothing removed", a["heading"]["rmse_deg"], math.sqrt((100 + 169 + 36 + 100) / 4))
+    euroc = write("euroc.csv", "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z []\n" +
+                  "".join(f"{50000000 * i},{0.05 * i:.6f},0,0,1,0,0,0\n" for i in range(100)))
+    b = evaluate("run", "--truth", euroc, "--ninedof")["attitude"]
+    check("the same truth in EuRoC's form", all(a[key] == b[key] for key in ("total", "inclination", "heading")), b["total"])
     a = evaluate("run", "--truth", truth, "--from", "1.6", "--to", "2.5")["attitude"]
     check("--from is in, --to is out", a["n"] == 2, a["n"])
     # Shifted by 2.5 s the truth ends at 2.45 s, before the last row at 2.5 s.
