@@ -7,9 +7,12 @@
 #include <string.h>
 
 #include "decimal.h"
+#include "event_source.h"
 #include "lines.h"
 #include "sharpness.h"
 #include "stats.h"
+
+#define POINT_MAX_E4 20479375 /* No point lies further out, see evs/types.h; in 1/10000 px. */
 
 /* The two pictures of the same events, while they are being filled. */
 typedef struct {
@@ -43,10 +46,10 @@ static bool take_q4(const char **p, const char *end, int16_t *q4, bool *known)
         *known = false;
         return true;
     }
-    if (!evh_decimal_parse(p, end, 4, &value, NULL)) { return false; }
-    value = (value * 16) / 10000;
-    if ((value < INT16_MIN) || (value > INT16_MAX)) { return false; }
-    *q4 = (int16_t)value;
+    if (!evh_decimal_parse(p, end, 4, &value, NULL) || (value < -POINT_MAX_E4) || (value > POINT_MAX_E4)) {
+        return false;
+    }
+    *q4 = (int16_t)((value * 16) / 10000);
     return true;
 }
 
@@ -57,7 +60,10 @@ static bool take_row(const evh_line_t *line, row_t *row)
     const char *const end = line->text + line->length;
     int64_t window = 0;
     row->known = true;
-    if (!evh_decimal_parse(&p, end, 6, &row->t_us, NULL)) { return false; }
+    if (!evh_decimal_parse(&p, end, 6, &row->t_us, NULL) || (row->t_us > EVH_TIME_MAX_US) ||
+        (row->t_us < -EVH_TIME_MAX_US)) {
+        return false;
+    }
     for (int i = 0; i < 4; i++) {
         if (!next_field(&p, end)) { return false; }
     }
