@@ -14,6 +14,8 @@
 
 #define POINT_MAX_E4 20479375 /* No point lies further out, see evs/types.h; in 1/10000 px. */
 
+#define TELL_LINES 16384u
+
 /* The two pictures of the same events, while they are being filled. */
 typedef struct {
     evl_sharpness_t before, after;
@@ -153,11 +155,14 @@ static bool is_saccade(windows_t *w, uint32_t window, bool *saccade, evh_error_t
 }
 
 static bool take_all(evl_run_sharpness_t *s, evh_lines_t *lines, windows_t *windows, pair_t kinds[2], int64_t from_us,
-                     int64_t to_us, evh_error_t *err)
+                     int64_t to_us, const evl_waiting_t *waiting, evh_error_t *err)
 {
     evh_line_t line;
     row_t row;
     while (evh_lines_next(lines, &line, err)) {
+        if ((waiting != NULL) && (lines->line % TELL_LINES == 0u)) {
+            waiting->tell(waiting->user, evh_lines_fraction(lines), lines->line);
+        }
         if ((line.length == 0u) || (line.text[0] == '#')) { continue; }
         if (!take_row(&line, &row)) {
             return evh_fail(err, "%s: line %" PRIu64 ": not a row of events.csv", lines->path, lines->line);
@@ -180,7 +185,8 @@ static bool take_all(evl_run_sharpness_t *s, evh_lines_t *lines, windows_t *wind
 }
 
 bool evl_run_sharpness(evl_run_sharpness_t *s, const char *events_path, const char *windows_path, uint16_t width_px,
-                       uint16_t height_px, int64_t from_us, int64_t to_us, evh_error_t *err)
+                       uint16_t height_px, int64_t from_us, int64_t to_us, const evl_waiting_t *waiting,
+                       evh_error_t *err)
 {
     evh_lines_t lines;
     windows_t windows;
@@ -203,7 +209,7 @@ bool evl_run_sharpness(evl_run_sharpness_t *s, const char *events_path, const ch
     if (!ok) {
         (void)evh_fail(err, "out of memory");
     } else {
-        ok = next_window(&windows, err) && take_all(s, &lines, &windows, kinds, from_us, to_us, err);
+        ok = next_window(&windows, err) && take_all(s, &lines, &windows, kinds, from_us, to_us, waiting, err);
     }
     for (int k = 0; k < 2; k++) {
         evl_sharpness_close(&kinds[k].before);

@@ -38,6 +38,12 @@ typedef struct {
     uint64_t n_events;
 } evl_run_sharpness_t;
 
+/** Called now and then with the share of events.csv that is done; for whoever waits. */
+typedef struct {
+    void (*tell)(void *user, double fraction, uint64_t n_events);
+    void *user;
+} evl_waiting_t;
+
 /** What a list of pictures says. */
 typedef struct {
     size_t n;
@@ -49,10 +55,12 @@ typedef struct {
 
 /**
  * @param events_path, windows_path  Of the run. Events in [from, to).
+ * @param waiting  May be NULL.
  * An event without a stabilized position counts in neither picture, so that both hold the same events.
  */
 bool evl_run_sharpness(evl_run_sharpness_t *s, const char *events_path, const char *windows_path, uint16_t width_px,
-                       uint16_t height_px, int64_t from_us, int64_t to_us, evh_error_t *err);
+                       uint16_t height_px, int64_t from_us, int64_t to_us, const evl_waiting_t *waiting,
+                       evh_error_t *err);
 void evl_run_sharpness_free(evl_run_sharpness_t *s);
 
 /** @return false when memory is short. Pictures whose unstabilized sharpness is 0 have no gain and do not count. */

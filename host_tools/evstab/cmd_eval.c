@@ -11,6 +11,7 @@
 #include "json.h"
 #include "lines.h"
 #include "options.h"
+#include "progress.h"
 #include "recording.h"
 
 #define OFFSET_MAX_US INT64_C(1000000000)
@@ -222,6 +223,9 @@ static bool eval_attitude(const evt_eval_t *e, const run_t *run, const evh_poses
                 "run or --align world tells more",
                 EVL_DEG_PER_RAD * x->attitude.align.spread_rad);
         }
+        if ((strcmp(x->attitude_source, "gyro") == 0) && (e->align <= EVL_ALIGN_HEADING)) {
+            evh_note("this run was replayed with --attitude gyro, which does not know where up is; see --align world");
+        }
         if (strcmp(x->attitude_source, "truth") == 0) {
             evh_note("this run was replayed with --attitude truth: its attitude is no estimate");
         }
@@ -277,16 +281,25 @@ static bool eval_velocity(const evt_eval_t *e, const run_t *run, const evh_poses
     return ok;
 }
 
+static void show_progress(void *progress, double fraction, uint64_t n_events)
+{
+    evt_progress_update(progress, fraction, n_events, "events");
+}
+
 static bool eval_sharpness(const evt_eval_t *e, const run_t *run, evt_eval_result_t *x, evh_error_t *err)
 {
+    evt_progress_t progress;
+    const evl_waiting_t waiting = {show_progress, &progress};
+    bool ok;
     if (!evh_file_exists(run->events)) {
         evh_note("no sharpness: the run has no events.csv; replay it with --write events");
         return true;
     }
-    if (!evl_run_sharpness(&x->sharpness, run->events, run->windows, run->width_px, run->height_px, e->from_us,
-                           e->to_us, err)) {
-        return false;
-    }
+    evt_progress_start(&progress);
+    ok = evl_run_sharpness(&x->sharpness, run->events, run->windows, run->width_px, run->height_px, e->from_us,
+                           e->to_us, &waiting, err);
+    evt_progress_end(&progress);
+    if (!ok) { return false; }
     if (!evl_gain(&x->sharpness.per_window, &x->per_window) || !evl_gain(&x->sharpness.per_100ms, &x->per_100ms)) {
         return evh_fail(err, "out of memory");
     }
