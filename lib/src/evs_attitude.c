@@ -14,21 +14,22 @@
 #define RUN_OF_EQUALS   3u        /* As many equal samples at the largest rate seen are a clipped gyro. */
 #define TIME_BACK_MAX   8u        /* As many samples of a time that runs back are a restarted clock. */
 
-#define RATE_MAX_Q24    INT32_C(2130706432) /* 127 rad/s: room for the bias */
-#define INV_6_Q32       INT32_C(715827883)
-#define INV_24_Q32      INT32_C(178956971)
-#define INV_120_Q32     INT32_C(35791394)
-#define INV_720_Q32     INT32_C(5965232)
-#define NORM_DONE_Q32   UINT32_C(65536)        /* 1.5e-5: the step of Newton that follows it leaves 3e-10 */
-#define SMALL_TURN      UINT32_C(1124)         /* 2^32 rad us in Q24: 0.288 rad, and 1/4 rad of half the rotation */
-#define BIAS_LIMIT_Q24  UINT32_C(8388608)      /* 0.5 rad/s: no bias is larger */
-#define CLIP_MIN_Q24    UINT32_C(72142029)     /* 4.3 rad/s: no gyro has a smaller full scale */
-#define SPIKE_Q23       UINT32_C(83886080)     /* 10 rad/s from one sample to the next */
-#define MOTION_MIN_Q24  UINT32_C(5856276)      /* 20 deg/s: a new field is only judged while the carrier turns */
-#define SHOCK_Q20       UINT32_C(62914560)     /* 60 m/s^2 in a single sample */
-#define ACCEL_DRIFT_Q7  UINT32_C(6)            /* 0.05 m/s^2: how far gravity may wander in the IMU while it rests */
-#define GRAVITY_Q24     INT32_C(164528285)     /* 9.80665 m/s^2 */
-#define GRAVITY_MIN_Q24 INT32_C(33554432)      /* 2 m/s^2: below it the mean acceleration has no direction */
+#define RATE_MAX_Q24   INT32_C(2130706432) /* 127 rad/s: room for the bias */
+#define INV_6_Q32      INT32_C(715827883)
+#define INV_24_Q32     INT32_C(178956971)
+#define INV_120_Q32    INT32_C(35791394)
+#define INV_720_Q32    INT32_C(5965232)
+#define NORM_DONE_Q32  UINT32_C(65536)    /* 1.5e-5: the step of Newton that follows it leaves 3e-10 */
+#define SMALL_TURN     UINT32_C(1124)     /* 2^32 rad us in Q24: 0.288 rad, and 1/4 rad of half the rotation */
+#define BIAS_LIMIT_Q24 UINT32_C(8388608)  /* 0.5 rad/s: no bias is larger */
+#define CLIP_MIN_Q24   UINT32_C(72142029) /* 4.3 rad/s: no gyro has a smaller full scale */
+#define SPIKE_Q23      UINT32_C(83886080) /* 10 rad/s from one sample to the next */
+#define MOTION_MIN_Q24 UINT32_C(5856276)  /* 20 deg/s: a new field is only judged while the carrier turns */
+#define SHOCK_Q20      UINT32_C(62914560) /* 60 m/s^2 in a single sample */
+#define ACCEL_DRIFT_Q7 UINT32_C(6)        /* 0.05 m/s^2: how far gravity may wander in the IMU while it rests */
+#define GRAVITY_Q24    INT32_C(164528285) /* 9.80665 m/s^2 */
+#define GRAVITY_MIN_Q24                                                                                                \
+    INT32_C(33554432) /* 2 m/s^2: less counts as this much, so that the horizon is found from anywhere */
 #define FIELD_MAX_Q16   (UINT32_C(4096) << 16) /* uT; keeps the rotation within 32 bits */
 #define GAIN_MAX_Q24    INT32_C(2130706432)    /* 127 1/s */
 #define CORRECT_MAX_Q24 INT32_C(268435456)     /* 16 rad/s: 0.16 rad of half a rotation in the longest step */
@@ -38,7 +39,7 @@
 #define BIAS_MOTION_Q31 43u                    /* per us: 0.02 of the correction is put down to bias before any rest */
 #define BIAS_STEP_Q31   INT32_C(4294967)       /* 2 mrad/s: a rate further off the bias is a slow turn; */
 #define BIAS_DRIFT_Q20  78812u                 /* per us: 35 urad/s^2 of drift are allowed in between */
-#define MAG_GAIN_Q32    21475u                 /* per us: mean of the field, 0.2 s */
+#define MAG_GAIN_Q32    21474u                 /* per us: mean of the field, 0.2 s */
 #define FIELD_GAIN_Q32  215u                   /* per us: the undisturbed field, 20 s */
 
 /* --- time ------------------------------------------------------------------------------------------------------ */
@@ -474,7 +475,7 @@ void evs_attitude_push_gyro(evs_attitude_t *att, uint32_t t_us, evs_vec3_t rate_
 void evs_attitude_push_delta_angle(evs_attitude_t *att, uint32_t t_us, evs_vec3_t angle_rad_q30, uint32_t dt_us)
 {
     EVS_ASSERT(att != NULL);
-    if ((dt_us == 0u) || (dt_us > EVS_ATTITUDE_DELTA_MAX_US)) {
+    if ((dt_us < EVS_ATTITUDE_DELTA_MIN_US) || (dt_us > EVS_ATTITUDE_DELTA_MAX_US)) {
         evs_count(&att->faults.n_time_bad);
         return;
     }
@@ -588,10 +589,10 @@ static void low_pass(evs_attitude_t *att, evs_vec3_t a_q18, uint32_t dt_us)
     const int32_t ex_q18 = a_q18.x - (s->x >> 6);
     const int32_t ey_q18 = a_q18.y - (s->y >> 6);
     const int32_t ez_q18 = a_q18.z - (s->z >> 6) - (att->gravity_q24 >> 6);
-    s->x = plus_sat(s->x, mac(0, ex_q18, g_q31) >> 24);
-    s->y = plus_sat(s->y, mac(0, ey_q18, g_q31) >> 24);
-    s->z = plus_sat(s->z, mac(0, ez_q18, g_q31) >> 24);
-    att->gravity_q24 = plus_sat(att->gravity_q24, mac(0, s->z, g_q31) >> 31);
+    s->x = plus_sat(s->x, mac(INT64_C(1) << 23, ex_q18, g_q31) >> 24);
+    s->y = plus_sat(s->y, mac(INT64_C(1) << 23, ey_q18, g_q31) >> 24);
+    s->z = plus_sat(s->z, mac(INT64_C(1) << 23, ez_q18, g_q31) >> 24);
+    att->gravity_q24 = plus_sat(att->gravity_q24, mac(INT64_C(1) << 30, s->z, g_q31) >> 31);
 }
 
 /* While settling: the plain mean of all accelerations so far, by a gain of 1 / elapsed time. */
@@ -653,15 +654,11 @@ static int32_t inverse_of(int32_t gravity_q24)
 static void correct_tilt(evs_attitude_t *att)
 {
     if (att->gravity_q24 < -GRAVITY_MIN_Q24) { turn_over(att); }
-    if (att->gravity_q24 < GRAVITY_MIN_Q24) {
-        att->correct_q24.x = 0;
-        att->correct_q24.y = 0;
-        return;
-    }
-    const int32_t k_q24 = fraction(att->w_accel_q24, inverse_of(att->gravity_q24));
+    const int32_t gravity_q24 = (att->gravity_q24 > GRAVITY_MIN_Q24) ? att->gravity_q24 : GRAVITY_MIN_Q24;
+    const int32_t k_q24 = fraction(att->w_accel_q24, inverse_of(gravity_q24));
     const int32_t limit = CORRECT_MAX_Q24;
-    att->correct_q24.x = evs_clamp(plus_sat(0, mac(0, att->slope_q24.y, k_q24) >> 24), -limit, limit);
-    att->correct_q24.y = evs_clamp(plus_sat(0, -(mac(0, att->slope_q24.x, k_q24) >> 24)), -limit, limit);
+    att->correct_q24.x = evs_clamp(plus_sat(0, mac(INT64_C(1) << 23, att->slope_q24.y, k_q24) >> 24), -limit, limit);
+    att->correct_q24.y = evs_clamp(plus_sat(0, -(mac(INT64_C(1) << 23, att->slope_q24.x, k_q24) >> 24)), -limit, limit);
 }
 
 /*
@@ -830,6 +827,17 @@ static void start_heading(evs_attitude_t *att, evs_vec3_t world_q16)
     }
 }
 
+/* Running mean; a sample moves it by no more than a part of its own size, so that a lone wild one hardly shows. */
+static void average_field(evs_attitude_t *att, evs_vec3_t world_q16, uint32_t dt_us)
+{
+    evs_vec3_t *const mean = &att->mag_lp_q16;
+    const int32_t gain_q32 = (int32_t)(dt_us * MAG_GAIN_Q32);
+    const int32_t limit = (int32_t)(evs_abs_u32(mean->x) + evs_abs_u32(mean->y) + evs_abs_u32(mean->z));
+    mean->x += fraction(evs_clamp(world_q16.x - mean->x, -limit, limit), gain_q32);
+    mean->y += fraction(evs_clamp(world_q16.y - mean->y, -limit, limit), gain_q32);
+    mean->z += fraction(evs_clamp(world_q16.z - mean->z, -limit, limit), gain_q32);
+}
+
 void evs_attitude_push_mag(evs_attitude_t *att, uint32_t t_us, evs_vec3_t field_ut_q16)
 {
     EVS_ASSERT(att != NULL);
@@ -857,10 +865,7 @@ void evs_attitude_push_mag(evs_attitude_t *att, uint32_t t_us, evs_vec3_t field_
     } else if ((att->mag_lp_q16.x | att->mag_lp_q16.y | att->mag_lp_q16.z) == 0) { /* the orientation was given */
         att->mag_lp_q16 = world_q16;
     } else {
-        const int32_t gain_q32 = (int32_t)(dt_us * MAG_GAIN_Q32);
-        (void)follow(&att->mag_lp_q16.x, world_q16.x, gain_q32);
-        (void)follow(&att->mag_lp_q16.y, world_q16.y, gain_q32);
-        (void)follow(&att->mag_lp_q16.z, world_q16.z, gain_q32);
+        average_field(att, world_q16, dt_us);
         correct_heading(att, dt_us);
     }
 }

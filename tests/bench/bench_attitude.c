@@ -6,10 +6,10 @@
  * Samples come from short integer oscillators: what they cost lies outside the marked regions.
  */
 #include "bench_markers.h"
+#include "bench_regions.h"
 #include "evs/attitude.h"
 
-enum { GYRO = 0, ACCEL = 1, MAG = 2, UPDATE_6D = 3, UPDATE_9D = 4, ORIENTATION = 5 };
-enum { WARM_UP = 8000, UPDATES = 1000, STEP_US = 1000 };
+enum { WARM_UP = 8000, STEP_US = 1000 };
 
 static evs_attitude_t att;
 static uint32_t now_us;
@@ -57,38 +57,51 @@ static void begin(bool with_mag)
 int main(void)
 {
     begin(false);
-    for (int i = 0; i < UPDATES; i++) {
+    for (int i = 0; i < BENCH_UPDATES; i++) {
         now_us += STEP_US;
         n++;
         const evs_vec3_t w = rate();
         const evs_vec3_t a = acceleration();
-        BENCH_START(UPDATE_6D);
+        BENCH_START(BENCH_UPDATE_6D);
         evs_attitude_push_gyro(&att, now_us, w);
         evs_attitude_push_accel(&att, now_us, a);
-        BENCH_STOP(UPDATE_6D);
+        BENCH_STOP(BENCH_UPDATE_6D);
     }
     begin(true);
-    for (int i = 0; i < UPDATES; i++) {
+    for (int i = 0; i < BENCH_UPDATES; i++) {
         now_us += STEP_US;
         n++;
         const evs_vec3_t w = rate();
         const evs_vec3_t a = acceleration();
         const evs_vec3_t m = field();
-        BENCH_START(UPDATE_9D);
-        BENCH_START(GYRO);
+        BENCH_START(BENCH_UPDATE_9D);
+        BENCH_START(BENCH_GYRO);
         evs_attitude_push_gyro(&att, now_us, w);
-        BENCH_STOP(GYRO);
-        BENCH_START(ACCEL);
+        BENCH_STOP(BENCH_GYRO);
+        BENCH_START(BENCH_ACCEL);
         evs_attitude_push_accel(&att, now_us, a);
-        BENCH_STOP(ACCEL);
-        BENCH_START(MAG);
+        BENCH_STOP(BENCH_ACCEL);
+        BENCH_START(BENCH_MAG);
         evs_attitude_push_mag(&att, now_us, m);
-        BENCH_STOP(MAG);
-        BENCH_STOP(UPDATE_9D);
-        BENCH_START(ORIENTATION);
-        volatile evs_quat_t q = evs_attitude_orientation(&att);
-        (void)q;
-        BENCH_STOP(ORIENTATION);
+        BENCH_STOP(BENCH_MAG);
+        BENCH_STOP(BENCH_UPDATE_9D);
+    }
+    for (int i = 0; i < WARM_UP + BENCH_UPDATES; i++) { /* lying still */
+        const evs_vec3_t w = {900, -2100, 3050};
+        const evs_vec3_t a = {1000, 2000, 10283000};
+        const evs_vec3_t m = {0, 1300000, -2600000};
+        now_us += STEP_US;
+        if (i < WARM_UP) {
+            evs_attitude_push_gyro(&att, now_us, w);
+            evs_attitude_push_accel(&att, now_us, a);
+            evs_attitude_push_mag(&att, now_us, m);
+            continue;
+        }
+        BENCH_START(BENCH_UPDATE_REST);
+        evs_attitude_push_gyro(&att, now_us, w);
+        evs_attitude_push_accel(&att, now_us, a);
+        evs_attitude_push_mag(&att, now_us, m);
+        BENCH_STOP(BENCH_UPDATE_REST);
     }
     return 0;
 }

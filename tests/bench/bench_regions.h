@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
  * SPDX-FileCopyrightText: 2026 the evstab authors */
-/* What bench_events.c marks. bench_table.py reads the numbers from here: one "NAME = value" per line. */
+/* What bench_events.c and bench_attitude.c mark. bench_table.py reads the numbers from here: one "NAME = value" per line. */
 #ifndef EVS_BENCH_REGIONS_H
 #define EVS_BENCH_REGIONS_H
 
@@ -17,6 +17,18 @@ enum {
     BENCH_WINDOW = 4,
     BENCH_ROTATE = 5,
     BENCH_SLICE = 6
+};
+
+/* bench_attitude.c */
+enum { BENCH_UPDATES = 1000 };
+
+enum {
+    BENCH_GYRO = 0,
+    BENCH_ACCEL = 1,
+    BENCH_MAG = 2,
+    BENCH_UPDATE_6D = 3,
+    BENCH_UPDATE_9D = 4,
+    BENCH_UPDATE_REST = 5
 };
 
 #endif

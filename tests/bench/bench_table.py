@@ -38,6 +38,14 @@ PER_EVENT = [  # (row, regions that it adds up)
     ("**all: grid + window + rotation**", ["LOOKUP_GRID_TILES", "WINDOW", "ROTATE"]),
 ]
 PER_CALL = [("new orientation, once per slice of at most 1 ms", "SLICE")]
+PER_UPDATE = [
+    ("attitude: gyro sample", "GYRO"),
+    ("attitude: accelerometer sample", "ACCEL"),
+    ("attitude: magnetometer sample", "MAG"),
+    ("**attitude: update without magnetometer (6D)**", "UPDATE_6D"),
+    ("**attitude: update with magnetometer (9D)**", "UPDATE_9D"),
+    ("attitude: update with magnetometer at rest, bias learnt", "UPDATE_REST"),
+]
 
 
 def constants():
@@ -53,15 +61,17 @@ def table(head, rows):
 
 def generate(trees, plugin):
     number = constants()
-    counts = {}
+    counts, attitude = {}, {}
     for tree in trees:
         image = os.path.join(tree.path, "tests", "bench", "bench_events")
         counts[tree.name], _ = count(plugin, RUN_QEMU, TARGETS[tree.name][1], image)
+        image = os.path.join(tree.path, "tests", "bench", "bench_attitude")
+        attitude[tree.name], _ = count(plugin, RUN_QEMU, TARGETS[tree.name][1], image)
 
-    def per_call(name, tree):
+    def per_call(name, tree, counts=counts, expected=number["BATCHES"]):
         calls, insns = counts[tree.name][number[name]]
-        if calls != number["BATCHES"]:
-            raise SystemExit(f"{tree.name}: {name} ran {calls} times, not {number['BATCHES']}")
+        if calls != expected:
+            raise SystemExit(f"{tree.name}: {name} ran {calls} times, not {expected}")
         return insns / calls
 
     names = [TARGETS[tree.name][0] for tree in trees]
@@ -69,6 +79,8 @@ def generate(trees, plugin):
             for row, regions in PER_EVENT]
     out = "Instructions per event:\n\n" + table(["step"] + names, rows)
     rows = [[row] + [f"{per_call(region, t):.0f}" for t in trees] for row, region in PER_CALL]
+    rows += [[row] + [f"{per_call(region, t, attitude, number['UPDATES']):.0f}" for t in trees]
+             for row, region in PER_UPDATE]
     return out + "\nInstructions per call:\n\n" + table(["step"] + names, rows)
 
 

@@ -42,7 +42,8 @@
 extern "C" {
 #endif
 
-#define EVS_ATTITUDE_DELTA_MAX_US 20000u /**< Longest increment of evs_attitude_push_delta_angle(). */
+#define EVS_ATTITUDE_DELTA_MIN_US 50u    /**< Shortest and */
+#define EVS_ATTITUDE_DELTA_MAX_US 20000u /**< longest increment of evs_attitude_push_delta_angle(). */
 
 /** Which filter. */
 typedef enum {
@@ -170,7 +171,8 @@ void evs_attitude_push_gyro(evs_attitude_t *att, uint32_t t_us, evs_vec3_t rate_
 /**
  * The same for IMUs that integrate themselves: the rotation from @p t_us - @p dt_us to @p t_us.
  * @param angle_rad_q30  Rotation vector. Integrals of each axis do as well while the axis moves little in between.
- * @param dt_us          [1, EVS_ATTITUDE_DELTA_MAX_US]; else the sample is counted as one of bad time.
+ * @param dt_us          [EVS_ATTITUDE_DELTA_MIN_US, EVS_ATTITUDE_DELTA_MAX_US]; else the sample is counted as one of
+ * bad time.
  */
 void evs_attitude_push_delta_angle(evs_attitude_t *att, uint32_t t_us, evs_vec3_t angle_rad_q30, uint32_t dt_us);
 
