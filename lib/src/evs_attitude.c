@@ -15,6 +15,7 @@
 #define TIME_BACK_MAX   8u        /* As many samples of a time that runs back are a restarted clock. */
 
 #define RATE_MAX_Q24   INT32_C(2130706432) /* 127 rad/s: room for the bias */
+#define ONE_Q60        (INT64_C(1) << 60)
 #define INV_6_Q32      INT32_C(715827883)
 #define INV_24_Q32     INT32_C(178956971)
 #define INV_120_Q32    INT32_C(35791394)
@@ -24,23 +25,25 @@
 #define BIAS_LIMIT_Q24 UINT32_C(8388608)  /* 0.5 rad/s: no bias is larger */
 #define CLIP_MIN_Q24   UINT32_C(72142029) /* 4.3 rad/s: no gyro has a smaller full scale */
 #define SPIKE_Q23      UINT32_C(83886080) /* 10 rad/s from one sample to the next */
+#define FAST_Q24       UINT32_C(75497472) /* 4.5 rad/s: below half of that, whatever the bias */
 #define MOTION_MIN_Q24 UINT32_C(5856276)  /* 20 deg/s: a new field is only judged while the carrier turns */
 #define SHOCK_Q20      UINT32_C(62914560) /* 60 m/s^2 in a single sample */
 #define ACCEL_DRIFT_Q7 UINT32_C(6)        /* 0.05 m/s^2: how far gravity may wander in the IMU while it rests */
 #define GRAVITY_Q24    INT32_C(164528285) /* 9.80665 m/s^2 */
 #define GRAVITY_MIN_Q24                                                                                                \
     INT32_C(33554432) /* 2 m/s^2: less counts as this much, so that the horizon is found from anywhere */
-#define FIELD_MAX_Q16   (UINT32_C(4096) << 16) /* uT; keeps the rotation within 32 bits */
-#define GAIN_MAX_Q24    INT32_C(2130706432)    /* 127 1/s */
-#define CORRECT_MAX_Q24 INT32_C(268435456)     /* 16 rad/s: 0.16 rad of half a rotation in the longest step */
-#define FIRST_MAG_Q24   INT32_C(134217728)     /* 8 1/s: how quickly the heading follows at first */
-#define REST_GAIN_Q32   12271u                 /* per us: running means of the rest detector, 0.35 s */
-#define BIAS_REST_Q31   537u                   /* per us: at rest the bias follows with 4 s */
-#define BIAS_MOTION_Q31 43u                    /* per us: 0.02 of the correction is put down to bias before any rest */
-#define BIAS_STEP_Q31   INT32_C(4294967)       /* 2 mrad/s: a rate further off the bias is a slow turn; */
-#define BIAS_DRIFT_Q20  78812u                 /* per us: 35 urad/s^2 of drift are allowed in between */
-#define MAG_GAIN_Q32    21474u                 /* per us: mean of the field, 0.2 s */
-#define FIELD_GAIN_Q32  215u                   /* per us: the undisturbed field, 20 s */
+#define FIELD_MAX_Q16    (UINT32_C(4096) << 16) /* uT; keeps the rotation within 32 bits */
+#define GAIN_MAX_Q24     INT32_C(2130706432)    /* 127 1/s */
+#define CORRECT_MAX_Q24  INT32_C(268435456)     /* 16 rad/s: 0.16 rad of half a rotation in the longest step */
+#define FIRST_MAG_Q24    INT32_C(134217728)     /* 8 1/s: how quickly the heading follows at first */
+#define REST_GAIN_Q32    12271u                 /* per us: running means of the rest detector, 0.35 s */
+#define BIAS_PERIOD_LOG2 14                     /* us: the bias is learnt every 16 ms, */
+#define BIAS_REST_Q31    INT32_C(8796093)       /* and follows with 4 s */
+#define BIAS_MOTION_Q31  43u                    /* per us: 0.02 of the correction is put down to bias before any rest */
+#define BIAS_STEP_Q31    INT32_C(4294967)       /* 2 mrad/s: a rate further off the bias is a slow turn; */
+#define BIAS_DRIFT_Q20   78812u                 /* per us: 35 urad/s^2 of drift are allowed in between */
+#define MAG_GAIN_Q32     21474u                 /* per us: mean of the field, 0.2 s */
+#define FIELD_GAIN_Q32   215u                   /* per us: the undisturbed field, 20 s */
 
 /* --- time ------------------------------------------------------------------------------------------------------ */
 
@@ -72,6 +75,7 @@ static uint32_t advance(evs_attitude_t *att, uint32_t *last_us, uint8_t *n_back,
 /* A small rotation as half its vector, Q32; a wide one (beyond half a radian) as its vector, Q28. */
 typedef struct {
     evs_vec3_t v;
+    int32_t scale; /* of the time it took: what takes rad/s in Q24 to rad in Q28 */
     bool wide;
 } rotation_t;
 
@@ -86,6 +90,7 @@ static rotation_t rotation_of(evs_vec3_t rate_q24, uint32_t size, uint32_t dt_us
 {
     const int32_t scale = rotation_scale(dt_us);
     rotation_t r;
+    r.scale = scale;
     r.wide = (((uint64_t)size * dt_us) >> 32) > SMALL_TURN;
     if (r.wide) {
         r.v.x = fraction(rate_q24.x, scale);
@@ -99,10 +104,10 @@ static rotation_t rotation_of(evs_vec3_t rate_q24, uint32_t size, uint32_t dt_us
     return r;
 }
 
-/* (1 - |q|^2) / 2 in Q32. |q| within 0.5 of 1. */
+/* (1 - |q|^2) / 2 in Q32, to the nearest 2^-29. |q| within 0.5 of 1. */
 static int32_t norm_defect(evs_quat_t q)
 {
-    return upper29(mac(mac(mac(mac(INT64_C(1) << 60, q.w, -q.w), q.x, -q.x), q.y, -q.y), q.z, -q.z));
+    return upper(mac(mac(mac(mac(ONE_Q60 + HALF_Q32, q.w, -q.w), q.x, -q.x), q.y, -q.y), q.z, -q.z)) * 8;
 }
 
 /* One step of Newton: what is left is 1.5 e^2. */
@@ -128,11 +133,11 @@ evs_quat_t evs_attitude_renormalized(evs_quat_t q)
 static int64_t wide_half(int32_t q) { return (int64_t)(((uint64_t)(uint32_t)q << 32) | (uint64_t)HALF_Q32); }
 
 /*
- * Turn the estimate by r, seen in the IMU, and by the correction due for dt, seen in the world:
+ * Turn the estimate by r, seen in the IMU, and by the correction due meanwhile, seen in the world:
  * q' = q + q d + c q with d = exp(r) - 1 and c half the correction's vector, |c| <= 0.16; the product of the two
  * small ones is left out. The series of d reach 2^-32 for |r| / 2 <= 1/4 rad, up to 2^-26 at its end.
  */
-static void turn(evs_attitude_t *att, const rotation_t *r, uint32_t dt_us)
+static void turn(evs_attitude_t *att, const rotation_t *r)
 {
     evs_vec3_t h = r->v;
     if (r->wide) {
@@ -146,7 +151,7 @@ static void turn(evs_attitude_t *att, const rotation_t *r, uint32_t dt_us)
     const int32_t s = fraction_down(u2, INV_120_Q32) - fraction_down(u, INV_6_Q32); /* sin(x) / x - 1 */
     const int32_t dx = h.x + fraction_down(h.x, s), dy = h.y + fraction_down(h.y, s), dz = h.z + fraction_down(h.z, s);
 
-    const int32_t scale = rotation_scale(dt_us);
+    const int32_t scale = r->scale;
     const int32_t cx = half_angle_q32(att->correct_q24.x, scale);
     const int32_t cy = half_angle_q32(att->correct_q24.y, scale);
     const int32_t cz = half_angle_q32(att->correct_q24.z, scale);
@@ -246,21 +251,22 @@ static void relax(evs_attitude_t *att, uint32_t dt_us)
 
 /* --- gyro: rest and bias --------------------------------------------------------------------------------------- */
 
-static void learn_bias_at_rest(evs_attitude_t *att, uint32_t dt_us)
+/* Called every 2^BIAS_PERIOD_LOG2 us of rest. */
+static void learn_bias_at_rest(evs_attitude_t *att)
 {
     const evs_vec3_t off_q24 = {att->gyro_lp_q24.x - (att->bias_q30.x >> 6),
                                 att->gyro_lp_q24.y - (att->bias_q30.y >> 6),
                                 att->gyro_lp_q24.z - (att->bias_q30.z >> 6)};
-    int32_t gain = (int32_t)(dt_us * BIAS_REST_Q31);
+    int32_t gain = BIAS_REST_Q31;
     if (!has_flag(att, EVS_ATTITUDE_BIAS_KNOWN)) {
         gain = INT32_MAX; /* the running mean as it is; refined from here */
     } else if (largest(off_q24) > (uint32_t)att->bias_step_q31 >> 7) {
         if (att->rest_us < RELEARN_US) { return; }
         gain = INT32_MAX;
     }
-    att->bias_q30.x += evs_q_mul(off_q24.x, gain, 25);
-    att->bias_q30.y += evs_q_mul(off_q24.y, gain, 25);
-    att->bias_q30.z += evs_q_mul(off_q24.z, gain, 25);
+    att->bias_q30.x += fraction(off_q24.x * 128, gain);
+    att->bias_q30.y += fraction(off_q24.y * 128, gain);
+    att->bias_q30.z += fraction(off_q24.z * 128, gain);
     att->bias_step_q31 = BIAS_STEP_Q31;
     set_flag(att, EVS_ATTITUDE_BIAS_KNOWN, true);
 }
@@ -284,16 +290,17 @@ static void watch_gyro(evs_attitude_t *att, evs_vec3_t raw_q24, uint32_t size, u
         const evs_vec3_t off = {follow(&att->gyro_lp_q24.x, raw_q24.x, gain_q32),
                                 follow(&att->gyro_lp_q24.y, raw_q24.y, gain_q32),
                                 follow(&att->gyro_lp_q24.z, raw_q24.z, gain_q32)};
-        still =
-            (largest(off) <= still_q24) && (largest(att->gyro_lp_q24) <= bias_max_q24) && has_flag(att, ACCEL_STEADY);
+        still = all_within(off, still_q24) && all_within(att->gyro_lp_q24, bias_max_q24) && has_flag(att, ACCEL_STEADY);
     }
-    att->rest_us = still ? add_sat_u32(att->rest_us, dt_us) : 0u;
+    const uint32_t before_us = att->rest_us;
+    att->rest_us = still ? add_sat_u32(before_us, dt_us) : 0u;
     const bool rest = att->rest_us >= att->cfg.rest_time_ms * UINT32_C(1000);
     att->flags &= ~(MOVING | EVS_ATTITUDE_AT_REST);
     if (moving) { att->flags |= MOVING; }
     if (rest) {
         att->flags |= EVS_ATTITUDE_AT_REST;
-        if (att->cfg.learn_bias && (att->cfg.mode != EVS_ATTITUDE_VALENTI)) { learn_bias_at_rest(att, dt_us); }
+        const bool due = ((att->rest_us ^ before_us) >> BIAS_PERIOD_LOG2) != 0u;
+        if (due && att->cfg.learn_bias && (att->cfg.mode != EVS_ATTITUDE_VALENTI)) { learn_bias_at_rest(att); }
     } else if (att->bias_step_q31 < (INT32_C(1) << 30)) {
         att->bias_step_q31 += (int32_t)((dt_us * BIAS_DRIFT_Q20) >> 20);
     }
@@ -337,7 +344,7 @@ static void bridge(evs_attitude_t *att, evs_vec3_t rate_q24, uint32_t dt_us)
     while (dt_us > 0u) {
         const uint32_t step_us = min_u32(dt_us, STEP_MAX_US);
         const rotation_t r = rotation_of(rate_q24, largest(rate_q24), step_us);
-        turn(att, &r, step_us);
+        turn(att, &r);
         dt_us -= step_us;
     }
 }
@@ -363,16 +370,19 @@ static bool take_back_spike(evs_attitude_t *att, evs_vec3_t rate_q24)
     return true;
 }
 
-static void look_for_spike(evs_attitude_t *att, evs_vec3_t rate_q24)
+static void look_for_spike(evs_attitude_t *att, evs_vec3_t rate_q24, uint32_t size)
 {
     if (has_flag(att, SPIKE_SUSPECT)) {
         set_flag(att, SPIKE_SUSPECT, false);
         if (take_back_spike(att, rate_q24)) {
             att->rate_q24 = rate_q24; /* as the rate before the newest */
+            set_flag(att, FAST, size > FAST_Q24);
             return;
         }
     }
-    if (largest(half_diff(rate_q24, att->rate_q24)) > SPIKE_Q23) {
+    const bool was_fast = has_flag(att, FAST); /* two slow samples cannot be far apart */
+    set_flag(att, FAST, size > FAST_Q24);
+    if ((was_fast || (size > FAST_Q24)) && (largest(half_diff(rate_q24, att->rate_q24)) > SPIKE_Q23)) {
         set_flag(att, SPIKE_SUSPECT, true);
         att->rate_before_q8[0] = (int16_t)(att->rate_q24.x >> 16);
         att->rate_before_q8[1] = (int16_t)(att->rate_q24.y >> 16);
@@ -410,7 +420,7 @@ static void gyro_step(evs_attitude_t *att, const gyro_sample_t *g)
         evs_count(&att->faults.n_gyro_saturated);
         recover(att, trim_us, 15); /* within about 33 ms */
     }
-    look_for_spike(att, g->rate_q24);
+    look_for_spike(att, g->rate_q24, g->size);
     drop_stale_corrections(att);
 
     if (g->since_us > att->cfg.gap_max_ms * UINT32_C(1000)) {
@@ -419,7 +429,7 @@ static void gyro_step(evs_attitude_t *att, const gyro_sample_t *g)
         att->rest_us = 0u;
     } else {
         if (g->since_us > g->dt_us) { bridge(att, mean_of(att->rate_q24, g->rate_q24), g->since_us - g->dt_us); }
-        turn(att, &g->r, g->dt_us);
+        turn(att, &g->r);
         watch_gyro(att, g->raw_q24, g->size, trim_us);
         if (att->cfg.learn_bias && (att->cfg.mode == EVS_ATTITUDE_VALENTI)) {
             evs_attitude_valenti_bias(att, g->rate_q24, trim_us);
@@ -499,6 +509,7 @@ void evs_attitude_push_delta_angle(evs_attitude_t *att, uint32_t t_us, evs_vec3_
     if (g.since_us < dt_us + dt_us / 4u) { g.since_us = dt_us; } /* jitter of the time stamps */
 
     const int32_t scale = rotation_scale(dt_us);
+    g.r.scale = scale;
     g.r.wide = largest(angle_rad_q30) > UINT32_C(300000000); /* 0.28 rad */
     if (g.r.wide) {
         g.r.v.x = evs_shr_r(angle_rad_q30.x >> 1, 1) - fraction(att->bias_q30.x >> 6, scale);
@@ -529,11 +540,11 @@ static void watch_accel(evs_attitude_t *att, evs_vec3_t a_q20, uint32_t dt_us)
     mean->z += fraction(half_off.z, 2 * gain_q32);
 
     /* Gravity must also keep its direction: a slow turn has a constant rate, but it carries gravity along. */
-    bool steady = largest(half_off) <= (att->cfg.rest_accel_mm_s2 * UINT32_C(1049)) / 2u;
+    bool steady = all_within(half_off, (att->cfg.rest_accel_mm_s2 * UINT32_C(1049)) / 2u);
     if (steady) {
         const evs_vec3_t wander_q7 = {(mean->x >> 13) - att->accel_ref_q7[0], (mean->y >> 13) - att->accel_ref_q7[1],
                                       (mean->z >> 13) - att->accel_ref_q7[2]};
-        steady = largest(wander_q7) <= ACCEL_DRIFT_Q7;
+        steady = all_within(wander_q7, ACCEL_DRIFT_Q7);
     }
     set_flag(att, ACCEL_STEADY, steady);
     if (!steady) {

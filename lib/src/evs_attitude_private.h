@@ -15,6 +15,7 @@
 #define ACCEL_STEADY   UINT32_C(0x00100000)
 #define SPIKE_SUSPECT  UINT32_C(0x00200000) /* the newest rate jumped */
 #define VALENTI_STEADY UINT32_C(0x00400000)
+#define FAST           UINT32_C(0x00800000) /* the newest rate is large enough for a spike */
 
 #define STEP_MAX_US 20000u /* Longest single integration step. */
 
@@ -32,6 +33,13 @@ static inline uint32_t add_sat_u32(uint32_t a, uint32_t b) { return (a > UINT32_
 static inline uint32_t largest(evs_vec3_t v)
 {
     return max_u32(max_u32(evs_abs_u32(v.x), evs_abs_u32(v.y)), evs_abs_u32(v.z));
+}
+
+/* Whether no component is larger than limit < 2^30: one comparison each. */
+static inline bool all_within(evs_vec3_t v, uint32_t limit)
+{
+    return ((uint32_t)v.x + limit <= 2u * limit) && ((uint32_t)v.y + limit <= 2u * limit) &&
+           ((uint32_t)v.z + limit <= 2u * limit);
 }
 
 /*

@@ -97,11 +97,13 @@ int main(void)
             evs_attitude_push_mag(&att, now_us, m);
             continue;
         }
-        BENCH_START(BENCH_UPDATE_REST);
+        BENCH_START(BENCH_REST_9D);
+        BENCH_START(BENCH_REST_6D);
         evs_attitude_push_gyro(&att, now_us, w);
         evs_attitude_push_accel(&att, now_us, a);
+        BENCH_STOP(BENCH_REST_6D);
         evs_attitude_push_mag(&att, now_us, m);
-        BENCH_STOP(BENCH_UPDATE_REST);
+        BENCH_STOP(BENCH_REST_9D);
     }
     return 0;
 }

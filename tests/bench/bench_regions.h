@@ -28,7 +28,8 @@ enum {
     BENCH_MAG = 2,
     BENCH_UPDATE_6D = 3,
     BENCH_UPDATE_9D = 4,
-    BENCH_UPDATE_REST = 5
+    BENCH_REST_6D = 5,
+    BENCH_REST_9D = 6
 };
 
 #endif

@@ -44,7 +44,8 @@ PER_UPDATE = [
     ("attitude: magnetometer sample", "MAG"),
     ("**attitude: update without magnetometer (6D)**", "UPDATE_6D"),
     ("**attitude: update with magnetometer (9D)**", "UPDATE_9D"),
-    ("attitude: update with magnetometer at rest, bias learnt", "UPDATE_REST"),
+    ("attitude: 6D, at rest, bias being learnt", "REST_6D"),
+    ("attitude: 9D, at rest, bias being learnt", "REST_9D"),
 ]
 
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * SPDX-FileCopyrightText: 2026 the evstab authors */
 #include "evs/attitude.h"
+#include "evs/axis_map.h"
 #include "unity.h"
 
 #include <math.h>
@@ -694,6 +695,48 @@ static void test_valenti_mode_learns_bias_in_steady_state(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.05, ldexp(evs_attitude_bias(&att).x, -24));
 }
 
+/* --- axis map -------------------------------------------------------------------------------------------------- */
+
+static void test_axis_map_swaps_mirrors_scales_and_takes_the_offset_away(void)
+{
+    evs_axis_map_t map = evs_axis_map_identity();
+    const evs_vec3_t v = vec(1.0, -2.0, 3.0, 20);
+    const evs_vec3_t same = evs_axis_map_apply(&map, v);
+    TEST_ASSERT_EQUAL_MEMORY(&v, &same, sizeof v);
+
+    const evs_axis_map_t mounted = {{{0, to_q(-1.0, 28), 0}, {to_q(1.02, 28), 0, 0}, {0, 0, to_q(-1.0, 28)}},
+                                    vec(0.5, 0.0, 1.0, 20)};
+    const evs_vec3_t out = evs_axis_map_apply(&mounted, v);
+    const evs_vec3_t want = vec(2.0, 0.51, -2.0, 20);
+    TEST_ASSERT_INT32_WITHIN(1, want.x, out.x);
+    TEST_ASSERT_INT32_WITHIN(1, want.y, out.y);
+    TEST_ASSERT_INT32_WITHIN(1, want.z, out.z);
+}
+
+static void test_axis_map_of_a_quaternion_rotates_as_it_does(void)
+{
+    const quat_d q = turn_d(0.7, -1.1, 2.0);
+    const evs_axis_map_t map = evs_axis_map_from_quat(quat_q30(q));
+    const evs_vec3_t out = evs_axis_map_apply(&map, vec(1.0, -2.0, 3.0, 20));
+    const quat_d want = mul_d(mul_d(q, quat(0.0, 1.0, -2.0, 3.0)), conj_d(q));
+    TEST_ASSERT_INT32_WITHIN(2, to_q(want.x, 20), out.x);
+    TEST_ASSERT_INT32_WITHIN(2, to_q(want.y, 20), out.y);
+    TEST_ASSERT_INT32_WITHIN(2, to_q(want.z, 20), out.z);
+}
+
+static void test_axis_map_saturates(void)
+{
+    evs_axis_map_t map = evs_axis_map_identity();
+    map.m_q28[0][0] = map.m_q28[0][1] = map.m_q28[0][2] = INT32_MAX;
+    map.m_q28[1][0] = map.m_q28[1][1] = map.m_q28[1][2] = INT32_MIN;
+    const evs_vec3_t top = {INT32_MAX, INT32_MAX, INT32_MAX};
+    const evs_vec3_t bottom = {INT32_MIN, INT32_MIN, INT32_MIN};
+    TEST_ASSERT_EQUAL_INT32(INT32_MAX, evs_axis_map_apply(&map, top).x);
+    TEST_ASSERT_EQUAL_INT32(INT32_MIN, evs_axis_map_apply(&map, top).y);
+    TEST_ASSERT_EQUAL_INT32(INT32_MIN, evs_axis_map_apply(&map, bottom).x);
+    TEST_ASSERT_EQUAL_INT32(INT32_MAX, evs_axis_map_apply(&map, bottom).y);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -726,5 +769,8 @@ int main(void)
     RUN_TEST(test_rates_may_differ_between_sensors_and_change_within_one);
     RUN_TEST(test_valenti_mode_converges_from_any_start_with_its_time_constant);
     RUN_TEST(test_valenti_mode_learns_bias_in_steady_state);
+    RUN_TEST(test_axis_map_swaps_mirrors_scales_and_takes_the_offset_away);
+    RUN_TEST(test_axis_map_of_a_quaternion_rotates_as_it_does);
+    RUN_TEST(test_axis_map_saturates);
     return UNITY_END();
 }
