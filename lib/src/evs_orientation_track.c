@@ -45,15 +45,6 @@ static const evs_orientation_t *sample_back(const evs_orientation_track_t *track
     return &track->ring[i];
 }
 
-/* Microseconds to seconds in Q30; t_us in [0, 10^6]. */
-static int32_t seconds_q30(int32_t t_us) { return (int32_t)evs_shr_r64((int64_t)t_us * INT64_C(1125899907), 20); }
-
-/* Rotation vector in rad (Q28) of a rate in rad/s (Q24) held for t_us. */
-static evs_vec3_t turned(evs_vec3_t rate_rad_s_q24, int32_t t_us)
-{
-    return evs_vec3_scale(rate_rad_s_q24, seconds_q30(t_us), 26);
-}
-
 /* a + (b - a) s, s in Q30. */
 static evs_vec3_t mix(evs_vec3_t a, evs_vec3_t b, int32_t s_q30)
 {
@@ -77,8 +68,8 @@ static void interpolate(const evs_orientation_t *a, const evs_orientation_t *b, 
      */
     const int32_t s = fraction_q30(from_a_us, span_us);
     const evs_vec3_t phi = evs_quat_to_rotvec(evs_quat_mul(evs_quat_conj(a->q_wc), b->q_wc));
-    const evs_vec3_t start = turned(a->rate_rad_s_q24, span_us);
-    const evs_vec3_t end_b = turned(b->rate_rad_s_q24, span_us);
+    const evs_vec3_t start = evs_rotvec_of_rate(a->rate_rad_s_q24, span_us);
+    const evs_vec3_t end_b = evs_rotvec_of_rate(b->rate_rad_s_q24, span_us);
     const evs_vec3_t bend = evs_vec3_cross(phi, end_b, 28);
     const evs_vec3_t bend2 = evs_vec3_cross(phi, bend, 28);
     const evs_vec3_t end = evs_vec3_add(evs_vec3_add(end_b, evs_vec3_scale(bend, 1, 1)),
@@ -108,7 +99,7 @@ static void predict(const evs_orientation_t *a, const evs_orientation_t *b, int3
         mean_rate = evs_vec3_add(mean_rate, evs_vec3_scale(step, (int32_t)change_q16, 17));
         end_rate = evs_vec3_add(end_rate, evs_vec3_scale(step, (int32_t)change_q16, 16));
     }
-    at->q_wc = evs_quat_mul(b->q_wc, evs_quat_from_rotvec(turned(mean_rate, ahead_us)));
+    at->q_wc = evs_quat_mul(b->q_wc, evs_quat_from_rotvec(evs_rotvec_of_rate(mean_rate, ahead_us)));
     at->rate_rad_s_q24 = end_rate;
 }
 

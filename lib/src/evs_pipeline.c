@@ -6,6 +6,7 @@
 
 #define FIFO_MAX    (UINT32_C(1) << 24)
 #define WAIT_MAX_US UINT32_C(1000000)
+#define TAU_MAX_MS  UINT32_C(100000)
 
 /* The camera after undistortion: the same sensor and K. */
 static evs_pinhole_t pinhole_of(const evs_camera_config_t *camera)
@@ -31,6 +32,7 @@ evs_pipeline_config_t evs_pipeline_config_default(const evs_camera_config_t *cam
                                        .source = EVS_PIPELINE_IMU,
                                        .attitude = evs_attitude_config_default(),
                                        .q_ci = evs_quat_identity(),
+                                       .view_tau_ms = 10000u,
                                        .track = evs_orientation_track_config_default(),
                                        .stabilize = evs_stabilize_config_default(&pinhole),
                                        .max_wait_us = 20000u,
@@ -47,7 +49,8 @@ static bool capacities_ok(const evs_pipeline_config_t *cfg)
            (cfg->camera.width_px >= 1u) && (cfg->camera.width_px <= EVS_SENSOR_MAX_PX) &&
            (cfg->camera.height_px >= 1u) && (cfg->camera.height_px <= EVS_SENSOR_MAX_PX) && (cfg->n_fifo >= 2u) &&
            (cfg->n_fifo <= FIFO_MAX) && (cfg->n_ring >= EVS_ORIENTATION_TRACK_MIN) && (cfg->n_ring <= FIFO_MAX) &&
-           (cfg->n_batch >= 1u) && (cfg->n_batch <= cfg->n_fifo) && (cfg->max_wait_us <= WAIT_MAX_US);
+           (cfg->n_batch >= 1u) && (cfg->n_batch <= cfg->n_fifo) && (cfg->max_wait_us <= WAIT_MAX_US) &&
+           (cfg->view_tau_ms <= TAU_MAX_MS);
 }
 
 static size_t n_tiles_of(const evs_pipeline_config_t *cfg)
@@ -164,6 +167,7 @@ evs_status_t evs_pipeline_init(evs_pipeline_t *p, const evs_pipeline_config_t *c
     p->stabilized = take(&cursor, cfg->n_batch * sizeof p->stabilized[0]);
     p->tiles = take(&cursor, cfg->n_batch * sizeof p->tiles[0]);
     p->window_q_rc = evs_quat_identity();
+    if (cfg->view_tau_ms > 0u) { p->view_per_us_q50 = (UINT64_C(1) << 50) / (cfg->view_tau_ms * UINT64_C(1000)); }
 
     evs_status_t status = evs_quat_normalize(cfg->q_ci, &p->cfg.q_ci);
     if (status == EVS_OK) { status = evs_attitude_init(&p->attitude, &cfg->attitude); }
@@ -174,14 +178,38 @@ evs_status_t evs_pipeline_init(evs_pipeline_t *p, const evs_pipeline_config_t *c
     return status; /* all were judged above */
 }
 
+/*
+ * Carry the view on by the rate, then move it towards the attitude by dt / tau of what is between them. The view takes
+ * over the attitude as it is when horizon or north have just been found, and after a gap in the gyro.
+ */
+static void follow_attitude(evs_pipeline_t *p, uint32_t t_us, evs_quat_t attitude_wc, evs_vec3_t rate_rad_s_q24)
+{
+    const int32_t dt_us = evs_time_diff_us(t_us, p->view_t_us);
+    const uint32_t known = evs_attitude_flags(&p->attitude) & (EVS_ATTITUDE_TILT_KNOWN | EVS_ATTITUDE_HEADING_KNOWN);
+    const bool follow = (p->cfg.view_tau_ms > 0u) && (known == p->view_known) && (dt_us > 0) &&
+                        ((uint32_t)dt_us <= p->cfg.track.max_gap_us);
+    p->view_t_us = t_us;
+    p->view_known = known;
+    if (!follow) {
+        p->view_q_wc = attitude_wc;
+        return;
+    }
+    const evs_quat_t carried =
+        evs_quat_mul(p->view_q_wc, evs_quat_from_rotvec(evs_rotvec_of_rate(rate_rad_s_q24, dt_us)));
+    const evs_vec3_t apart = evs_quat_to_rotvec(evs_quat_mul(attitude_wc, evs_quat_conj(carried)));
+    const uint64_t part_q30 = ((uint64_t)(uint32_t)dt_us * p->view_per_us_q50) >> 20;
+    const int32_t step_q30 = (part_q30 < (uint32_t)EVS_ONE_Q30) ? (int32_t)part_q30 : EVS_ONE_Q30;
+    const evs_quat_t moved = evs_quat_mul(evs_quat_from_rotvec(evs_vec3_scale(apart, step_q30, 30)), carried);
+    if (evs_quat_normalize(moved, &p->view_q_wc) != EVS_OK) { p->view_q_wc = attitude_wc; }
+}
+
 void evs_pipeline_push_gyro(evs_pipeline_t *p, uint32_t t_us, evs_vec3_t rate_rad_s_q24)
 {
     EVS_ASSERT((p != NULL) && (p->cfg.source == EVS_PIPELINE_IMU));
     evs_attitude_push_gyro(&p->attitude, t_us, rate_rad_s_q24);
-    const evs_orientation_t sample = {
-        .t_us = t_us,
-        .q_wc = evs_quat_mul(evs_attitude_orientation(&p->attitude), evs_quat_conj(p->cfg.q_ci)),
-        .rate_rad_s_q24 = evs_quat_rotate(p->cfg.q_ci, evs_attitude_rate(&p->attitude))};
+    const evs_vec3_t rate_c = evs_quat_rotate(p->cfg.q_ci, evs_attitude_rate(&p->attitude));
+    follow_attitude(p, t_us, evs_quat_mul(evs_attitude_orientation(&p->attitude), evs_quat_conj(p->cfg.q_ci)), rate_c);
+    const evs_orientation_t sample = {.t_us = t_us, .q_wc = p->view_q_wc, .rate_rad_s_q24 = rate_c};
     (void)evs_orientation_track_push(&p->track, &sample);
 }
 

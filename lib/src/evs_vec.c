@@ -138,6 +138,12 @@ evs_status_t evs_quat_rate(evs_quat_t q_a, evs_quat_t q_b, int32_t dt_us, evs_ve
     return EVS_OK;
 }
 
+evs_vec3_t evs_rotvec_of_rate(evs_vec3_t rate_rad_s_q24, int32_t t_us)
+{
+    const int32_t t_s_q30 = (int32_t)evs_shr_r64((int64_t)t_us * INT64_C(1125899907), 20); /* 2^50 / 10^6 */
+    return evs_vec3_scale(rate_rad_s_q24, t_s_q30, 26);
+}
+
 evs_mat3_t evs_quat_to_mat3(evs_quat_t q)
 {
     /* Doubled products in Q30: a b / 2^29. */

@@ -388,6 +388,47 @@ static void test_imu_samples_become_camera_orientations(void)
     TEST_ASSERT_EQUAL_INT(EVS_ERR_NULL, evs_pipeline_newest_orientation(&p, NULL));
 }
 
+/* Switched on in motion: the filter starts 0.4 rad off and learns better; the view must turn by what the gyro says. */
+static double view_error_after(uint32_t view_tau_ms, double *apart)
+{
+    evs_pipeline_config_t cfg = config(EVS_PIPELINE_IMU);
+    cfg.view_tau_ms = view_tau_ms;
+    init(&cfg);
+    const evs_event_t ev = event_at(1000u);
+    evs_orientation_t before = {0};
+    evs_orientation_t at = {0};
+    for (uint32_t ms = 0; ms <= 1000u; ms++) {
+        const double push = (ms < 500u) ? 4.0 : -4.0; /* an acceleration that averages out */
+        evs_pipeline_push_accel(&p, 1000u * ms, evs_vec3_from_double(push, 0, 9.81, 20));
+        evs_pipeline_push_gyro(&p, 1000u * ms, evs_vec3_from_double(0, 0, 0.5, 24));
+        if (ms == 3u) { /* the first window: from here on somebody looks */
+            TEST_ASSERT_EQUAL_UINT(1u, evs_pipeline_push_events(&p, &ev, 1u));
+            pull_all();
+            TEST_ASSERT_EQUAL_INT(EVS_OK, evs_pipeline_newest_orientation(&p, &before));
+        }
+    }
+    TEST_ASSERT_EQUAL_INT(EVS_OK, evs_pipeline_newest_orientation(&p, &at));
+    const model_quat_t attitude = model_from_fixed(evs_attitude_orientation(evs_pipeline_attitude(&p)));
+    *apart = model_angle(attitude, model_from_fixed(at.q_wc));
+    const model_quat_t turned = model_mul(model_conj(model_from_fixed(before.q_wc)), model_from_fixed(at.q_wc));
+    return model_angle(turned, model_exp(0, 0, 0.5 * 0.997));
+}
+
+static void test_view_turns_by_the_gyro_while_the_attitude_still_settles(void)
+{
+    n_out = 0u;
+    n_ends = 0u;
+    double apart;
+    const double at_once = view_error_after(0u, &apart);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, 0.0, apart);
+    const double smooth = view_error_after(10000u, &apart);
+    TEST_ASSERT_TRUE(apart > 0.05);
+    TEST_ASSERT_TRUE(at_once > 0.1);
+    TEST_ASSERT_TRUE(smooth < 0.04); /* a tenth of the 0.4 rad at most: 1 s of 10 */
+    const double slow = view_error_after(100000u, &apart);
+    TEST_ASSERT_TRUE(slow < smooth);
+}
+
 static void test_table_in_flash_gives_the_bits_of_a_table_built_here(void)
 {
     camera.dist_q32[0] = -(INT64_C(1) << 30);
@@ -426,8 +467,8 @@ static void test_table_in_flash_gives_the_bits_of_a_table_built_here(void)
 static void test_init_refuses_what_any_module_refuses_and_leaves_the_context_alone(void)
 {
     const evs_pipeline_config_t good = config(EVS_PIPELINE_IMU);
-    evs_pipeline_config_t bad[14];
-    for (size_t i = 0; i < 14u; i++) { bad[i] = good; }
+    evs_pipeline_config_t bad[15];
+    for (size_t i = 0; i < 15u; i++) { bad[i] = good; }
     bad[0].camera.fx_q16 = 0;
     bad[1].table_step_px = 3u;
     bad[2].n_cols = 0u;
@@ -442,7 +483,8 @@ static void test_init_refuses_what_any_module_refuses_and_leaves_the_context_alo
     bad[11].n_ring = 3u;
     bad[12].n_batch = good.n_fifo + 1u;
     bad[13].camera.width_px = 0u;
-    for (size_t i = 0; i < 14u; i++) {
+    bad[14].view_tau_ms = 100001u;
+    for (size_t i = 0; i < 15u; i++) {
         p.slice_first_us = 77u;
         TEST_ASSERT_EQUAL_INT(EVS_ERR_ARG, evs_pipeline_init(&p, &bad[i], memory, BYTES));
         TEST_ASSERT_EQUAL_UINT32(77u, p.slice_first_us);
@@ -470,6 +512,7 @@ int main(void)
     RUN_TEST(test_restarted_clock_closes_the_window_and_goes_on);
     RUN_TEST(test_full_fifo_takes_no_more_and_never_locks_up);
     RUN_TEST(test_imu_samples_become_camera_orientations);
+    RUN_TEST(test_view_turns_by_the_gyro_while_the_attitude_still_settles);
     RUN_TEST(test_table_in_flash_gives_the_bits_of_a_table_built_here);
     RUN_TEST(test_init_refuses_what_any_module_refuses_and_leaves_the_context_alone);
     return UNITY_END();

@@ -220,6 +220,21 @@ static void test_rate_leads_from_one_orientation_to_the_other(void)
     TEST_ASSERT_EQUAL_INT32(INT32_MAX, got.x);
 }
 
+static void test_rate_held_for_a_time_is_a_rotation_vector(void)
+{
+    for (int i = 0; i < 2000; i++) {
+        const evs_vec3_t rate = evs_vec3_from_double(uniform(-100, 100), uniform(-7, 7), uniform(-0.01, 0.01), 24);
+        const int32_t t_us = (int32_t)uniform(0, 70000);
+        const evs_vec3_t r = evs_rotvec_of_rate(rate, t_us);
+        TEST_ASSERT_DOUBLE_WITHIN(2e-7, evs_q_to_double(rate.x, 24) * t_us * 1e-6, evs_q_to_double(r.x, 28));
+        TEST_ASSERT_DOUBLE_WITHIN(2e-8, evs_q_to_double(rate.y, 24) * t_us * 1e-6, evs_q_to_double(r.y, 28));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-8, evs_q_to_double(rate.z, 24) * t_us * 1e-6, evs_q_to_double(r.z, 28));
+    }
+    const evs_vec3_t far = evs_rotvec_of_rate((evs_vec3_t){INT32_MAX, INT32_MIN, 0}, 1000000);
+    TEST_ASSERT_EQUAL_INT32(INT32_MAX, far.x);
+    TEST_ASSERT_EQUAL_INT32(INT32_MIN, far.y);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -232,5 +247,6 @@ int main(void)
     RUN_TEST(test_exponential_is_within_its_bound_for_small_and_for_whole_turns);
     RUN_TEST(test_logarithm_inverts_the_exponential_up_to_half_a_turn);
     RUN_TEST(test_rate_leads_from_one_orientation_to_the_other);
+    RUN_TEST(test_rate_held_for_a_time_is_a_rotation_vector);
     return UNITY_END();
 }

@@ -13,6 +13,10 @@
  *          orientation of its time slice is known (half a slice and one gyro sample, about 2 ms); when the gyro falls
  *          behind by max_wait_us or the FIFO is full, a short prediction serves. What is still unknown then comes out
  *          with oriented = false and EVS_POINT_OUTSIDE, and is counted.
+ *          The view is held by the gyro. The attitude filter also corrects itself, by tens of degrees a second when it
+ *          is switched on in motion; in the view that would be a rotation that never happened. So once horizon and north are
+ *          found, the orientation of the view integrates the filter's unbiased rate, and approaches the filter's
+ *          orientation with the time constant view_tau_ms.
  * Memory   one evs_pipeline_t and one block of caller memory: evs_pipeline_bytes(), or for a static array
  *          EVS_PIPELINE_BYTES(). For 240 x 180 with a grid of step 8, 34 x 26 tiles, 2048 events, 32 orientations and
  *          batches of 128: 22 KB and the context of about 1 KB.
@@ -59,6 +63,8 @@ typedef struct {                /** Settings; copied by evs_pipeline_init(). */
     evs_pipeline_source_t source;         /**< Default IMU. */
     evs_attitude_config_t attitude;       /**< Source IMU. */
     evs_quat_t q_ci;                      /**< Source IMU: camera from IMU, unit. Default identity. */
+    uint32_t view_tau_ms;                 /**< Source IMU: time constant with which the view takes over corrections of
+                                               the attitude, see Model. 0: at once. [0, 100000], default 10000. */
     evs_orientation_track_config_t track; /**< Among others the time offset of the orientations against the events. */
     evs_stabilize_config_t stabilize;     /**< Its pinhole is set from the camera by evs_pipeline_init(). */
     uint32_t max_wait_us;                 /**< Longest wait for an orientation, by the events' clock. [0, 10^6], default
@@ -94,6 +100,10 @@ typedef struct {
 typedef struct { /** Context. A complete type only so that you can place it: every member is private. */
     evs_pipeline_config_t cfg;
     evs_attitude_t attitude;
+    evs_quat_t view_q_wc; /* newest orientation of the view, and its time */
+    uint32_t view_t_us;
+    uint32_t view_known;      /* whether horizon and north were, then: flags of the attitude */
+    uint64_t view_per_us_q50; /* 1 / view_tau_ms */
     evs_orientation_track_t track;
     evs_undistort_t undistort;
     evs_window_t window;
@@ -179,7 +189,7 @@ bool evs_pipeline_pull(evs_pipeline_t *p, evs_pipeline_chunk_t *chunk);
  */
 void evs_pipeline_finish(evs_pipeline_t *p);
 
-/** Newest orientation of the camera, in the time of its own clock. @return EVS_OK or EVS_ERR_STATE (none yet). */
+/** Newest orientation of the camera as the view uses it, in the time of its own clock. @return EVS_OK or EVS_ERR_STATE (none yet). */
 EVS_NODISCARD evs_status_t evs_pipeline_newest_orientation(const evs_pipeline_t *p, evs_orientation_t *newest);
 
 /** The attitude filter, for its flags, bias and counters (read) or to give it an initial orientation and bias. */

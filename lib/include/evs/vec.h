@@ -122,6 +122,9 @@ evs_vec3_t evs_quat_to_rotvec(evs_quat_t q);
  */
 EVS_NODISCARD evs_status_t evs_quat_rate(evs_quat_t q_a, evs_quat_t q_b, int32_t dt_us, evs_vec3_t *rate_rad_s_q24);
 
+/** The rotation vector, rad in Q28, of a rate held for t_us in [0, 10^6]: rate * t, saturating. */
+evs_vec3_t evs_rotvec_of_rate(evs_vec3_t rate_rad_s_q24, int32_t t_us);
+
 /* --- matrices -------------------------------------------------------------------------------------------------- */
 
 /** The matrix of the unit quaternion q; error of each entry <= 2^-28. */
