@@ -3,6 +3,7 @@
 /* evstab replay: a recording through the library, the same code as on a microcontroller. */
 #include <inttypes.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "command.h"
@@ -60,6 +61,11 @@ static const evt_option_t OPTIONS[] = {
     {"from", '\0', "S", "First time to replay, in seconds of the recording's clock.", &opt.from, NULL},
     {"to", '\0', "S", "Stop before this time.", &opt.to, NULL},
     {"write", '\0', "events", "Also write events.csv, a row per event.", &opt.write, NULL},
+    {"video", '\0', "FILE",
+     "Also make a video, .mp4 or .gif, of the events raw,\nstabilized, and on a canvas of twice the size, at half\n"
+     "speed. Needs ffmpeg.",
+     &opt.video, NULL},
+    {"no-report", '\0', NULL, "Do not write report.html.", NULL, &opt.no_report},
     {"quiet", 'q', NULL, "No progress, no notes, no closing line.", NULL, &opt_quiet},
 };
 
@@ -69,12 +75,14 @@ static const evt_usage_t USAGE = {
     .about = "Replays a recording through the library. INPUT is a folder in ECD form (events.txt imu.txt "
              "groundtruth.txt calib.txt,\n"
              "each also .gz) or one event file (\"t x y p\" lines); files outside of it are named by options.\n"
-             "Writes into DIR: summary.json, attitude.csv (world from camera, per sample), windows.csv, and events.csv "
-             "on demand.\n"
+             "Writes into DIR: report.html to look at, summary.json, attitude.csv (world from camera, per sample), "
+             "windows.csv,\n"
+             "and events.csv on demand.\n"
              "Several INPUTs: each is replayed by a process of its own into DIR/NAME, with what it had to say in "
              "log.txt;\n"
              "DIR/summary.csv has a row for each. Exit status 1 if any of them failed.",
     .examples = "  evstab replay slider_depth -o out\n"
+                "  evstab replay slider_depth -o out --video out/slider.mp4\n"
                 "  evstab replay events_02.097-02.196.txt --calib calib.txt --imu imu.txt -o out --write events\n"
                 "  evstab replay recordings/* -o out -j 4",
     .options = OPTIONS,
@@ -98,7 +106,7 @@ static void report_unoriented(const evt_replay_result_t *x)
                   x->n_unoriented, x->n_events, events[0], events[1], samples[0], samples[1]);
 }
 
-static void report(const evt_replay_t *r, const evt_replay_result_t *x)
+static void report(const evt_replay_t *r, const evt_replay_options_t *o, const evt_replay_result_t *x)
 {
     evh_tally_report(&x->events_tally, evh_path_name(r->rec.events));
     if (r->rec.imu != NULL) { evh_tally_report(&x->imu_tally, evh_path_name(r->rec.imu)); }
@@ -110,65 +118,123 @@ static void report(const evt_replay_t *r, const evt_replay_result_t *x)
                  " rotated out of range",
                  x->n_no_undistorted + x->n_out_of_range, x->n_events, x->n_no_undistorted, x->n_out_of_range);
     }
-    if ((x->events_tally.n_fault[EVH_FAULT_OFF_SENSOR] > 0u) && (opt.size == NULL)) {
+    if ((x->events_tally.n_fault[EVH_FAULT_OFF_SENSOR] > 0u) && (o->size == NULL)) {
         evh_note("the sensor is taken as %ux%u; --size says otherwise", (unsigned)r->calib.width_px,
                  (unsigned)r->calib.height_px);
     }
 }
 
-static void print_result(const evt_replay_t *r, const evt_replay_result_t *x)
+static void print_result(const evt_replay_t *r, const evt_replay_options_t *o, const evt_replay_outcome_t *outcome)
 {
+    const evt_replay_result_t *const x = &outcome->result;
+    const evr_numbers_t *const n = &outcome->numbers;
     char duration[32];
     if (evh_is_quiet()) { return; }
     duration[evh_decimal_format(duration, x->t_last_us - x->t_first_us, 6u)] = '\0';
     (void)printf("%s: %" PRIu64 " events in %s s, %" PRIu64 " windows, %" PRIu64
-                 " saccades; %.1f ns per event in the library, %.1f in all\n"
-                 "wrote %s/: summary.json attitude.csv windows.csv%s\n",
+                 " saccades; %.1f ns per event in the library, %.1f in all\n",
                  evh_path_name(r->rec.events), x->n_events, duration, x->n_windows, x->n_saccades,
-                 (double)x->library_ns / (double)x->n_events, (double)x->wall_ns / (double)x->n_events, opt.output,
-                 r->write_events ? " events.csv" : "");
+                 (double)x->library_ns / (double)x->n_events, (double)x->wall_ns / (double)x->n_events);
+    if (n->sharpness_before > 0.0) {
+        (void)printf("sharpness %.3g raw, %.3g stabilized: x%.2f\n", n->sharpness_before, n->sharpness_after,
+                     n->sharpness_after / n->sharpness_before);
+    }
+    (void)printf("wrote %s/: %ssummary.json attitude.csv windows.csv%s\n", o->output,
+                 o->no_report ? "" : "report.html ", r->write_events ? " events.csv" : "");
+    if (o->video != NULL) { (void)printf("wrote %s\n", o->video); }
 }
 
-static int replay(const evt_replay_t *r)
+/* After a failure too: what was read is there, and both tell how far that was. */
+static bool write_results(const evt_replay_t *r, const evt_replay_options_t *o, evr_report_t *page,
+                          evt_replay_outcome_t *outcome, const char *failure, evh_error_t *err)
 {
-    evt_replay_result_t result;
-    evh_error_t err = {""};
-    evh_error_t summary_err = {""};
-    const bool ok = evt_replay_run(r, opt.output, &result, &err);
-    bool written = true;
-    if (result.n_events > 0u) {
-        report(r, &result); /* Also after a failure: what was read is there, and the summary says how far. */
-        written = evt_replay_write_summary(r, &opt, &result, opt.output, ok ? NULL : err.text, &summary_err);
+    char *const summary = evt_replay_summary(r, o, &outcome->result, failure);
+    bool ok;
+    if (summary == NULL) { return evh_fail(err, "%s/summary.json: out of memory", o->output); }
+    ok = evt_replay_write_summary(summary, o->output, err);
+    if (page != NULL) {
+        outcome->numbers = evr_report_finish(page);
+        ok = evr_report_write(page, o->output, evh_path_name(o->input), summary, err) && ok;
     }
+    free(summary);
+    return ok;
+}
+
+static bool open_watch(evt_replay_watch_t *watch, const evt_replay_t *r, const evt_replay_options_t *o,
+                       evh_error_t *err)
+{
+    const evh_calib_t *const c = &r->calib;
+    watch->report = NULL;
+    watch->video = NULL;
+    if (!o->no_report) {
+        watch->report = evr_report_open(c->width_px, c->height_px, 0.5 * (c->fx_px + c->fy_px));
+        if (watch->report == NULL) { return evh_fail(err, "out of memory for the report; --no-report does without"); }
+    }
+    if (o->video == NULL) { return true; }
+    watch->video = evr_video_open(o->video, c->width_px, c->height_px, err);
+    return watch->video != NULL;
+}
+
+static int replay(const evt_replay_t *r, const evt_replay_options_t *o, evt_replay_outcome_t *outcome)
+{
+    evt_replay_watch_t watch;
+    evh_error_t err = {""};
+    evh_error_t write_err = {""};
+    bool ok = open_watch(&watch, r, o, &err) && evt_replay_run(r, o->output, &watch, &outcome->result, &err);
+    bool written = true;
+    ok = evr_video_close(watch.video, &err) && ok;
+    if (outcome->result.n_events > 0u) {
+        report(r, o, &outcome->result);
+        written = write_results(r, o, watch.report, outcome, ok ? NULL : err.text, &write_err);
+    }
+    evr_report_close(watch.report);
     if (!ok || !written) {
-        (void)fprintf(stderr, "evstab replay: %s\n", ok ? summary_err.text : err.text);
+        (void)fprintf(stderr, "evstab replay: %s\n", ok ? write_err.text : err.text);
         return EVT_EXIT_FAILED;
     }
-    print_result(r, &result);
+    print_result(r, o, outcome);
     return EVT_EXIT_OK;
+}
+
+static bool video_is_no_input(const evt_replay_t *r, const evt_replay_options_t *o, evh_error_t *err)
+{
+    const char *const inputs[] = {r->rec.events, r->rec.imu, r->rec.poses, r->calib_path};
+    for (size_t i = 0u; (o->video != NULL) && (i < sizeof inputs / sizeof inputs[0]); i++) {
+        if ((inputs[i] != NULL) && evh_same_file(inputs[i], o->video)) {
+            return evh_fail(err, "%s: is an input; name another file for --video", o->video);
+        }
+    }
+    return true;
+}
+
+int evt_replay_perform(const evt_replay_options_t *o, evt_replay_outcome_t *outcome)
+{
+    evt_replay_t r;
+    evh_error_t err = {""};
+    bool usage_fault = false;
+    int status = EVT_EXIT_FAILED;
+    memset(outcome, 0, sizeof *outcome);
+    memset(&r, 0, sizeof r);
+    /* No ffmpeg: told before any work. */
+    if (((o->video == NULL) || evr_video_possible(o->video, &err)) && evt_replay_settle(&r, o, &usage_fault, &err) &&
+        video_is_no_input(&r, o, &err)) {
+        status = replay(&r, o, outcome);
+    } else if (usage_fault) {
+        status = evt_usage_error(&USAGE, "%s", err.text);
+    } else {
+        (void)fprintf(stderr, "evstab replay: %s\n", err.text);
+    }
+    evt_replay_free(&r);
+    return status;
 }
 
 /* One recording, after the words of the command line have been taken. */
 static int replay_one(const char *input, const char *output)
 {
-    evt_replay_t r;
-    evh_error_t err = {""};
-    bool usage_fault = false;
-    int status = EVT_EXIT_OK;
+    static evt_replay_outcome_t outcome;
     opt.input = input;
     opt.output = output;
-    if (!evt_replay_settle(&r, &opt, &usage_fault, &err)) {
-        status = EVT_EXIT_FAILED;
-        if (usage_fault) {
-            status = evt_usage_error(&USAGE, "%s", err.text);
-        } else {
-            (void)fprintf(stderr, "evstab replay: %s\n", err.text);
-        }
-    } else {
-        status = replay(&r);
-    }
-    evt_replay_free(&r);
-    return status;
+    return evt_replay_perform(&opt, &outcome);
 }
 
 /* A wrong word is told once, before anything is started, and not in the log of every recording. The first recording
@@ -204,6 +270,10 @@ int evt_replay_main(int argc, char **argv)
     if ((opt_jobs != NULL) && !evt_parse_int(opt_jobs, 1, EVT_BATCH_PARALLEL_MAX, &n_jobs)) {
         return evt_usage_error(&USAGE, "--jobs is '%s'; expected 1 .. %d", opt_jobs, EVT_BATCH_PARALLEL_MAX);
     }
+    if ((opt.video != NULL) && !evr_video_name_ok(opt.video)) {
+        return evt_usage_error(&USAGE, "--video is '%s'; expected a name that ends in .mp4 or .gif", opt.video);
+    }
+    if ((opt.video != NULL) && (n > 1u)) { return evt_usage_error(&USAGE, "--video takes a single recording"); }
     evh_set_quiet(opt_quiet);
     if (n == 1u) { return replay_one(words[0], opt.output); }
     if (!words_are_right(words, n, &status)) { return status; }

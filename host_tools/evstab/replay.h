@@ -3,7 +3,7 @@
 /**
  * @file  replay.h
  * @brief evstab replay, in four parts: settings from the command line and files, the run, the output files, the
- * summary.
+ * summary. The report and the video look on while it runs.
  */
 #ifndef EVT_REPLAY_H
 #define EVT_REPLAY_H
@@ -15,6 +15,8 @@
 #include "imu_text.h"
 #include "poses_text.h"
 #include "recording.h"
+#include "report.h"
+#include "video.h"
 
 typedef enum { EVT_ATTITUDE_NONE = 0, EVT_ATTITUDE_IMU, EVT_ATTITUDE_GYRO, EVT_ATTITUDE_TRUTH } evt_attitude_t;
 
@@ -25,8 +27,8 @@ typedef struct {
     const char *calib, *imu, *poses, *config;
     const char *size, *imu_order;
     const char *attitude, *window, *rotation, *saccade;
-    const char *imu_offset, *from, *to, *write;
-    bool paper;
+    const char *imu_offset, *from, *to, *write, *video;
+    bool paper, no_report;
 } evt_replay_options_t;
 
 /** What will be done: every default resolved. */
@@ -87,13 +89,31 @@ void evt_replay_put_chunk(evt_replay_output_t *out, const evs_pipeline_chunk_t *
                           int64_t t_first_us, int64_t t_last_us);
 bool evt_replay_output_close(evt_replay_output_t *out, evh_error_t *err);
 
-/** Run it all. @p result is filled as far as the run came, also when it fails. */
-bool evt_replay_run(const evt_replay_t *r, const char *dir, evt_replay_result_t *result, evh_error_t *err);
+/** Who looks on; NULL = nobody. */
+typedef struct {
+    evr_report_t *report;
+    evr_video_t *video;
+} evt_replay_watch_t;
 
-/** summary.json. @param failure  Text of what ended the run early, or NULL. */
-bool evt_replay_write_summary(const evt_replay_t *r, const evt_replay_options_t *options,
-                              const evt_replay_result_t *result, const char *dir, const char *failure,
-                              evh_error_t *err);
+/** Run it all. @p result is filled as far as the run came, also when it fails. */
+bool evt_replay_run(const evt_replay_t *r, const char *dir, const evt_replay_watch_t *watch,
+                    evt_replay_result_t *result, evh_error_t *err);
+
+/** The text of summary.json, for free(), or NULL. @param failure  Text of what ended the run early, or NULL. */
+char *evt_replay_summary(const evt_replay_t *r, const evt_replay_options_t *options, const evt_replay_result_t *result,
+                         const char *failure);
+
+/** summary.json. */
+bool evt_replay_write_summary(const char *text, const char *dir, evh_error_t *err);
+
+/** What a whole replay came to. */
+typedef struct {
+    evt_replay_result_t result;
+    evr_numbers_t numbers; /**< Zeros without a report. */
+} evt_replay_outcome_t;
+
+/** All of evstab replay, its messages too. @return the exit status. */
+int evt_replay_perform(const evt_replay_options_t *options, evt_replay_outcome_t *outcome);
 
 const char *evt_window_reason_name(evs_window_reason_t reason);
 

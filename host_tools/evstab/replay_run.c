@@ -20,6 +20,7 @@
 
 typedef struct {
     const evt_replay_t *r;
+    evt_replay_watch_t watch;
     evt_replay_result_t *result;
     evs_pipeline_t pipeline;
     void *memory;
@@ -98,7 +99,10 @@ static bool push_orientations(run_t *run, int64_t until_us, evh_error_t *err)
         run->newest_us = t_us;
         if (result->n_orientations++ == 0u) { result->orientation_first_us = t_us; }
         result->orientation_last_us = t_us;
-        if (known) { evt_replay_put_orientation(&run->out, t_us, &newest, flags); }
+        if (known) {
+            evt_replay_put_orientation(&run->out, t_us, &newest, flags);
+            if (run->watch.report != NULL) { evr_report_orientation(run->watch.report, t_us, &newest); }
+        }
         if (!evt_orientation_feed_fetch(&run->feed, err)) { return false; }
     }
     return true;
@@ -146,6 +150,12 @@ static void take_chunk(run_t *run, const evs_pipeline_chunk_t *chunk)
     }
     count_points(run->result, chunk);
     evt_replay_put_chunk(&run->out, chunk, t_us, run->window_first_us, run->window_last_us);
+    if (run->watch.report != NULL) {
+        evr_report_chunk(run->watch.report, chunk, t_us, run->window_first_us, run->window_last_us);
+    }
+    if (run->watch.video != NULL) {
+        evr_video_add(run->watch.video, t_us, chunk->events, chunk->undistorted, chunk->stabilized, chunk->n);
+    }
     if (chunk->end.reason != EVS_WINDOW_OPEN) {
         run->window_empty = true;
         run->result->n_windows++;
@@ -207,6 +217,7 @@ static bool run_all(run_t *run, size_t n_first, evh_error_t *err)
     ssize_t n = (ssize_t)n_first;
     bool ok = true;
     result->t_first_us = run->t_us[0];
+    if (run->watch.report != NULL) { evr_report_start(run->watch.report, result->t_first_us); }
     while (ok && (n > 0)) {
         result->n_events += (uint64_t)n;
         result->t_last_us = run->t_us[n - 1];
@@ -254,7 +265,8 @@ static bool start_and_run(run_t *run, const char *dir, evh_error_t *err)
     return run_all(run, (size_t)n, err);
 }
 
-bool evt_replay_run(const evt_replay_t *r, const char *dir, evt_replay_result_t *result, evh_error_t *err)
+bool evt_replay_run(const evt_replay_t *r, const char *dir, const evt_replay_watch_t *watch,
+                    evt_replay_result_t *result, evh_error_t *err)
 {
     run_t *const run = calloc(1u, sizeof *run);
     const int64_t start_ns = evt_now_ns();
@@ -262,6 +274,7 @@ bool evt_replay_run(const evt_replay_t *r, const char *dir, evt_replay_result_t 
     memset(result, 0, sizeof *result);
     if (run == NULL) { return evh_fail(err, "out of memory"); }
     run->r = r;
+    run->watch = *watch;
     run->result = result;
     run->newest_us = INT64_MIN;
     run->window_empty = true;

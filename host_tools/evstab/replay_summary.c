@@ -171,25 +171,21 @@ static void add_all(cJSON *root, const evt_replay_t *r, const evt_replay_options
     }
 }
 
-bool evt_replay_write_summary(const evt_replay_t *r, const evt_replay_options_t *options,
-                              const evt_replay_result_t *result, const char *dir, const char *failure, evh_error_t *err)
+char *evt_replay_summary(const evt_replay_t *r, const evt_replay_options_t *options, const evt_replay_result_t *result,
+                         const char *failure)
 {
     cJSON *const root = cJSON_CreateObject();
-    char *const path = evh_path_join(dir, "summary.json");
     char *text = NULL;
-    bool ok = false;
-    if ((root != NULL) && (path != NULL)) {
+    if (root != NULL) {
         add_all(root, r, options, result, failure);
         text = cJSON_Print(root);
     }
-    if (text != NULL) {
-        evh_csv_t out;
-        ok = evh_csv_open_path(&out, path, text, err) && evh_csv_close(&out, err);
-    } else {
-        (void)evh_fail(err, "%s/summary.json: out of memory", dir);
-    }
-    cJSON_free(text);
-    free(path);
     cJSON_Delete(root);
-    return ok;
+    return text;
+}
+
+bool evt_replay_write_summary(const char *text, const char *dir, evh_error_t *err)
+{
+    evh_csv_t out;
+    return evh_csv_open(&out, dir, "summary.json", text, err) && evh_csv_close(&out, err);
 }

@@ -1,0 +1,14 @@
+/* SPDX-License-Identifier: MIT
+ * SPDX-FileCopyrightText: 2026 the evstab authors */
+/**
+ * @file  assets.h
+ * @brief The files that the page is made of, put into the program by embed.cmake. Each ends with '\0'.
+ */
+#ifndef EVR_ASSETS_H
+#define EVR_ASSETS_H
+
+extern const char evr_asset_report_html[];
+extern const char evr_asset_report_css[];
+extern const char evr_asset_report_js[];
+
+#endif

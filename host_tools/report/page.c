@@ -1,0 +1,266 @@
+/* SPDX-License-Identifier: MIT
+ * SPDX-FileCopyrightText: 2026 the evstab authors */
+/* The page: a template, a style, a script, and the data as JSON for the script. */
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "assets.h"
+#include "collect.h"
+#include "csv_writer.h"
+#include "evs/version.h"
+#include "png_bytes.h"
+#include "text.h"
+
+/* base64 of pictures; what does not fit is left out, from the end. Keeps the page within about 3 MB. */
+#define CLIP_BYTES_MAX 2100000u
+
+static void put_seconds(evr_text_t *t, int64_t t_us) { evr_printf(t, "%.6f", (double)t_us * 1e-6); }
+
+static void put_points(evr_text_t *t, const evr_series_t *s, int64_t last_us)
+{
+    const char *comma = "";
+    evr_put(t, "[");
+    for (size_t i = 0u; i < EVR_SERIES_BINS; i++) {
+        evr_sample_t sample[2];
+        const size_t n = evr_series_samples(&s->bin[i], sample);
+        for (size_t k = 0u; k < n; k++) {
+            if (sample[k].t_us > last_us) { continue; } /* Orientations run ahead of the last event. */
+            evr_printf(t, "%s%.6g,", comma, (double)sample[k].t_us * 1e-6);
+            evr_put_number(t, sample[k].value, 5);
+            comma = ",";
+        }
+    }
+    evr_put(t, "]");
+}
+
+/* Events per second, at the middle of each bin; the last one is cut where the recording ends. */
+static void put_rates(evr_text_t *t, const evr_counts_t *c, int64_t last_us)
+{
+    const char *comma = "";
+    evr_put(t, "[");
+    for (int64_t i = 0; i < (int64_t)EVR_SERIES_BINS; i++) {
+        const int64_t from_us = i * c->width_us;
+        const int64_t to_us = (from_us + c->width_us <= last_us + 1) ? from_us + c->width_us : last_us + 1;
+        if ((to_us <= from_us) || ((i > 0) && (to_us - from_us < c->width_us / 2))) { break; }
+        evr_printf(t, "%s%.6g,", comma, (double)(from_us + to_us) * 0.5e-6);
+        evr_put_number(t, (double)c->n[i] * 1e6 / (double)(to_us - from_us), 5);
+        comma = ",";
+    }
+    evr_put(t, "]");
+}
+
+static bool has_samples(const evr_series_t *s)
+{
+    for (size_t i = 0u; i < EVR_SERIES_BINS; i++) {
+        if (s->bin[i].n > 0u) { return true; }
+    }
+    return false;
+}
+
+static void begin_plot(evr_text_t *t, const char *comma, const char *id, const char *title, const char *unit)
+{
+    evr_printf(t, "%s\n{\"id\":\"%s\",\"title\":\"%s\",\"unit\":\"%s\",\"curves\":[", comma, id, title, unit);
+}
+
+static void put_axes(evr_text_t *t, const evr_series_t s[3], int64_t last_us, const char *const name[3])
+{
+    for (int i = 0; i < 3; i++) {
+        evr_printf(t, "%s{\"name\":\"%s\",\"points\":", (i > 0) ? "," : "", name[i]);
+        put_points(t, &s[i], last_us);
+        evr_put(t, "}");
+    }
+    evr_put(t, "]}");
+}
+
+/* A plot that has nothing to show is not there. */
+static void put_plots(evr_text_t *t, const evr_report_t *r)
+{
+    static const char *const TURN[3] = {"x (pitch)", "y (yaw)", "z (roll)"};
+    const int64_t last_us = r->last_us - r->first_us;
+    const char *comma = "";
+    evr_put(t, "[");
+    if (has_samples(&r->attitude_deg[0])) {
+        begin_plot(t, comma, "attitude", "Attitude relative to the start (rotation vector)", "\\u00b0");
+        put_axes(t, r->attitude_deg, last_us, TURN);
+        begin_plot(t, ",", "rate", "Angular rate of the camera", "\\u00b0/s");
+        put_axes(t, r->rate_deg_s, last_us, TURN);
+        comma = ",";
+    }
+    begin_plot(t, comma, "events", "Event rate", "events/s");
+    evr_put(t, "{\"name\":\"events\",\"fill\":true,\"points\":");
+    put_rates(t, &r->events, last_us);
+    evr_put(t, "}]}");
+    if (has_samples(&r->window_ms)) {
+        begin_plot(t, ",", "window", "Duration of the windows", "ms");
+        evr_put(t, "{\"name\":\"window\",\"points\":");
+        put_points(t, &r->window_ms, last_us);
+        evr_put(t, "}]}");
+    }
+    if (has_samples(&r->window_gain)) {
+        begin_plot(t, ",", "gain", "Sharpness gain per window", "after / before");
+        evr_put(t, "{\"name\":\"gain\",\"points\":");
+        put_points(t, &r->window_gain, last_us);
+        evr_put(t, "}],\"base\":1}");
+    }
+    evr_put(t, "]");
+}
+
+static void put_saccades(evr_text_t *t, const evr_report_t *r)
+{
+    const uint64_t kept = (r->n_saccades < EVR_SACCADES_MAX) ? r->n_saccades : EVR_SACCADES_MAX;
+    evr_printf(t, "{\"n\":%" PRIu64 ",\"t\":[", r->n_saccades);
+    for (uint64_t i = 0u; i < kept; i++) {
+        evr_printf(t, "%s%.6g", (i > 0u) ? "," : "", (double)r->saccade_us[i] * 1e-6);
+    }
+    evr_put(t, "]}");
+}
+
+static void put_png(evr_text_t *t, const uint8_t *grey, int width, int height)
+{
+    evr_png_t png;
+    if (!evr_png_encode(&png, grey, width, height)) {
+        t->failed = true;
+        return;
+    }
+    evr_put(t, "\"");
+    evr_put_base64(t, png.bytes, png.n);
+    evr_put(t, "\"");
+    free(png.bytes);
+}
+
+static void put_span(evr_text_t *t, const evr_report_t *r)
+{
+    const evr_span_facts_t *const f = &r->spans.best;
+    evr_printf(t, "{\"width\":%u,\"height\":%u,\"n_events\":%" PRIu64, (unsigned)r->width_px, (unsigned)r->height_px,
+               f->n_events);
+    evr_put(t, ",\"from_s\":");
+    put_seconds(t, f->first_us - r->first_us);
+    evr_put(t, ",\"to_s\":");
+    put_seconds(t, f->last_us - r->first_us);
+    evr_printf(t, ",\"shaken\":%s", (r->spans.best_good && (f->shake.n > 0u)) ? "true" : "false");
+    evr_printf(t, ",\"rate_deg_s\":%.5g,\"motion_px_s\":%.5g", f->shake.rate_rad_s * 57.29577951308232,
+               f->shake.motion_px_s);
+    evr_printf(t, ",\"sharpness\":[%.6g,%.6g],\n\"before\":", f->before, f->after);
+    put_png(t, r->spans.best_before, r->width_px, r->height_px);
+    evr_put(t, ",\n\"after\":");
+    put_png(t, r->spans.best_after, r->width_px, r->height_px);
+    evr_put(t, "}");
+}
+
+/* One picture as one PNG: the pane at the left, the canvas at the right of it. */
+static void lay_out(const evr_panes_t *p, const uint8_t *picture, uint8_t *sheet)
+{
+    const size_t w = (size_t)p->width;
+    const uint8_t *const canvas = picture + evr_panes_canvas_at(p);
+    for (size_t y = 0u; y < 2u * (size_t)p->height; y++) {
+        uint8_t *const row = sheet + y * 3u * w;
+        if (y < (size_t)p->height) { memcpy(row, picture + y * w, w); }
+        memcpy(row + w, canvas + y * 2u * w, 2u * w);
+    }
+}
+
+static void put_clip(evr_text_t *t, const evr_report_t *r)
+{
+    const evr_panes_t *const p = &r->clip.panes;
+    const size_t limit = t->n + CLIP_BYTES_MAX;
+    uint8_t *const sheet = calloc(6u, evr_panes_canvas_at(p));
+    if (sheet == NULL) {
+        t->failed = true;
+        return;
+    }
+    evr_printf(t, "{\"width\":%d,\"height\":%d,\"bin\":%d,\"rate_deg_s\":%.5g,\"picture_s\":%.6f,\"from_s\":", p->width,
+               p->height, p->bin, r->take->rate_rad_s * 57.29577951308232, (double)r->take->picture_us * 1e-6);
+    put_seconds(t, r->take->start_us - r->first_us);
+    evr_put(t, ",\"pictures\":[");
+    for (int i = 0; (i < r->take->n) && (t->n < limit); i++) {
+        lay_out(p, r->take->pictures + (size_t)i * p->n_cells, sheet);
+        evr_put(t, (i > 0) ? ",\n" : "\n");
+        put_png(t, sheet, 3 * p->width, 2 * p->height);
+    }
+    evr_put(t, "]}");
+    free(sheet);
+}
+
+static void put_numbers(evr_text_t *t, const evr_report_t *r)
+{
+    const evr_spans_t *const s = &r->spans;
+    const double n = (s->n_spans > 0u) ? (double)s->n_spans : 1.0;
+    const double m = (r->n_measured > 0u) ? (double)r->n_measured : 1.0;
+    evr_printf(t, "{\"spans\":%" PRIu64 ",\"spans_sharpness\":[%.6g,%.6g]", s->n_spans, s->before_sum / n,
+               s->after_sum / n);
+    evr_printf(t, ",\"windows\":%" PRIu64 ",\"windows_measured\":%" PRIu64 ",\"windows_sharpness\":[%.6g,%.6g]",
+               r->n_windows, r->n_measured, r->window_before_sum / m, r->window_after_sum / m);
+    if (s->all.n > 0u) {
+        evr_printf(t, ",\"rate_deg_s\":[%.5g,%.5g],\"motion_px_s\":[%.5g,%.5g]", s->all.rate_rad_s * 57.29577951308232,
+                   s->all.rate_max_rad_s * 57.29577951308232, s->all.motion_px_s, s->all.motion_max_px_s);
+    }
+    evr_put(t, "}");
+}
+
+static void put_data(evr_text_t *t, const evr_report_t *r, const char *name, const char *summary)
+{
+    evr_put(t, "{\"name\":");
+    evr_put_json_string(t, name);
+    evr_put(t, ",\"version\":\"" EVS_VERSION_STRING "\",\"duration_s\":");
+    put_seconds(t, r->last_us - r->first_us);
+    evr_put(t, ",\n\"numbers\":");
+    put_numbers(t, r);
+    evr_put(t, ",\n\"saccades\":");
+    put_saccades(t, r);
+    evr_put(t, ",\n\"plots\":");
+    put_plots(t, r);
+    if (r->spans.n_spans > 0u) {
+        evr_put(t, ",\n\"span\":");
+        put_span(t, r);
+    }
+    if (r->take != NULL) {
+        evr_put(t, ",\n\"clip\":");
+        put_clip(t, r);
+    }
+    evr_put(t, ",\n\"summary\":");
+    evr_put_json_in_html(t, summary);
+    evr_put(t, "}");
+}
+
+/* The template with its @WORDS@ replaced. */
+static void put_page(evr_text_t *t, const evr_report_t *r, const char *name, const char *summary)
+{
+    const char *html = evr_asset_report_html;
+    const char *at;
+    while ((at = strchr(html, '@')) != NULL) {
+        const size_t length = strcspn(at + 1, "@");
+        evr_put_n(t, html, (size_t)(at - html));
+        if (strncmp(at + 1, "TITLE", length) == 0) { evr_put_html(t, name); }
+        if (strncmp(at + 1, "STYLE", length) == 0) { evr_put(t, evr_asset_report_css); }
+        if (strncmp(at + 1, "DATA", length) == 0) { put_data(t, r, name, summary); }
+        if (strncmp(at + 1, "SCRIPT", length) == 0) { evr_put(t, evr_asset_report_js); }
+        html = at + length + 2u;
+    }
+    evr_put(t, html);
+}
+
+bool evr_report_write(const evr_report_t *r, const char *dir, const char *name, const char *summary, evh_error_t *err)
+{
+    evr_text_t page = {NULL, 0u, 0u, false};
+    evh_csv_t out;
+    bool ok;
+    put_page(&page, r, name, summary);
+    if (page.failed) {
+        evr_text_free(&page);
+        return evh_fail(err, "%s/report.html: out of memory", dir);
+    }
+    ok = evh_csv_open(&out, dir, "report.html", "<!DOCTYPE html>", err);
+    if (ok) {
+        for (size_t at = 0u; at < page.n;) {
+            const size_t n = (page.n - at < 32768u) ? page.n - at : 32768u;
+            char *const to = evh_csv_reserve(&out, n);
+            memcpy(to, page.bytes + at, n);
+            evh_csv_advance(&out, to + n);
+            at += n;
+        }
+        ok = evh_csv_close(&out, err);
+    }
+    evr_text_free(&page);
+    return ok;
+}
