@@ -37,12 +37,8 @@ void evl_sharpness_clear(evl_sharpness_t *s)
     s->n_off = 0u;
 }
 
-/* 1/16 px to the nearest pixel, halves up; negative numbers round down as well. */
-static int nearest_px(int16_t q4)
-{
-    const int up = q4 + 8;
-    return (up >= 0) ? up / 16 : -((15 - up) / 16);
-}
+/* 1/16 px to the nearest pixel, halves up, below 0 too: counted from -2048 px, where nothing is negative. */
+static int nearest_px(int16_t q4) { return (int)((unsigned)(q4 + 2048 * 16 + 8) / 16u) - 2048; }
 
 void evl_sharpness_add(evl_sharpness_t *s, const evs_point_t *points, size_t n)
 {

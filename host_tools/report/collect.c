@@ -91,6 +91,7 @@ void evr_report_orientation(evr_report_t *r, int64_t t_us, const evs_orientation
                          evs_q_to_double(o->rate_rad_s_q24.z, 24u)};
     const int64_t since_us = t_us - r->first_us;
     double from_start[4];
+    r->turning = true;
     evr_shake_put(&r->shake, t_us, sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]), r->focal_px * hypot(w[0], w[1]));
     if (since_us < 0) { return; } /* The filter warming up. */
     if (!r->has_start) { memcpy(r->start_wxyz, q, sizeof q); }
@@ -137,6 +138,17 @@ static void end_window(evr_report_t *r, int64_t first_us, int64_t last_us)
     r->measuring = false;
 }
 
+/* Both pictures get the same events: those whose orientation is unknown have no place in the second, and none in the
+ * comparison. */
+static void measure(evr_report_t *r, const evs_pipeline_chunk_t *c, bool saccade, const int64_t *t_us)
+{
+    evr_spans_add(&r->spans, &r->shake, saccade, t_us, c->undistorted, c->stabilized, c->n);
+    if (r->measuring) {
+        evl_sharpness_add(&r->window_before, c->undistorted, c->n);
+        evl_sharpness_add(&r->window_after, c->stabilized, c->n);
+    }
+}
+
 void evr_report_chunk(evr_report_t *r, const evs_pipeline_chunk_t *c, const int64_t *t_us, int64_t window_first_us,
                       int64_t window_last_us)
 {
@@ -144,13 +156,9 @@ void evr_report_chunk(evr_report_t *r, const evs_pipeline_chunk_t *c, const int6
         const bool saccade = c->saccade && !r->saccade_taken;
         if (!r->window_open) { begin_window(r); }
         if (saccade) { take_saccade(r, t_us[0]); }
-        evr_spans_add(&r->spans, &r->shake, saccade, t_us, c->undistorted, c->stabilized, c->n);
         evr_clip_add(&r->clip, &r->shake, t_us, c->events, c->undistorted, c->stabilized, c->n);
-        if (r->measuring) {
-            evl_sharpness_add(&r->window_before, c->undistorted, c->n);
-            evl_sharpness_add(&r->window_after, c->stabilized, c->n);
-        }
-        for (size_t i = 0u; i < c->n; i++) { evr_counts_add(&r->events, t_us[i] - r->first_us); }
+        if (c->oriented || !r->turning) { measure(r, c, saccade, t_us); }
+        evr_counts_add(&r->events, r->first_us, t_us, c->n);
         r->n_events += c->n;
         r->credit += CREDIT_PX * (double)c->n;
         r->last_us = t_us[c->n - 1u];

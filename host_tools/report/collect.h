@@ -26,6 +26,7 @@ struct evr_report {
     evr_clip_t clip;
     const evr_take_t *take;
 
+    bool turning;   /**< There are orientations at all. */
     bool has_start; /**< There is an orientation that the others are relative to. */
     double start_wxyz[4];
     double turn_rad[3]; /**< The last rotation vector, so that the next one continues it. */

@@ -15,6 +15,10 @@
 /* base64 of pictures; what does not fit is left out, from the end. Keeps the page within about 3 MB. */
 #define CLIP_BYTES_MAX 2100000u
 
+#define RATE_STEPS 300
+
+#define STILL_RAD_S 0.01 /* Below this "fastest" says nothing. */
+
 static void put_seconds(evr_text_t *t, int64_t t_us) { evr_printf(t, "%.6f", (double)t_us * 1e-6); }
 
 static void put_points(evr_text_t *t, const evr_series_t *s, int64_t last_us)
@@ -34,17 +38,23 @@ static void put_points(evr_text_t *t, const evr_series_t *s, int64_t last_us)
     evr_put(t, "]");
 }
 
-/* Events per second, at the middle of each bin; the last one is cut where the recording ends. */
+/* Events per second, at the middle of each step. Few steps: with few events in each, the curve would be noise. The last
+ * step ends where the recording does. */
 static void put_rates(evr_text_t *t, const evr_counts_t *c, int64_t last_us)
 {
+    const int64_t n_bins = last_us / c->width_us + 1;
+    const int64_t group = (n_bins + RATE_STEPS - 1) / RATE_STEPS;
     const char *comma = "";
     evr_put(t, "[");
-    for (int64_t i = 0; i < (int64_t)EVR_SERIES_BINS; i++) {
+    for (int64_t i = 0; i < n_bins; i += group) {
         const int64_t from_us = i * c->width_us;
-        const int64_t to_us = (from_us + c->width_us <= last_us + 1) ? from_us + c->width_us : last_us + 1;
-        if ((to_us <= from_us) || ((i > 0) && (to_us - from_us < c->width_us / 2))) { break; }
+        const int64_t end_us = from_us + group * c->width_us;
+        const int64_t to_us = (end_us <= last_us + 1) ? end_us : last_us + 1;
+        uint64_t n = 0u;
+        if ((i > 0) && (to_us - from_us < (end_us - from_us) / 2)) { break; }
+        for (int64_t k = i; (k < i + group) && (k < n_bins); k++) { n += c->n[k]; }
         evr_printf(t, "%s%.6g,", comma, (double)(from_us + to_us) * 0.5e-6);
-        evr_put_number(t, (double)c->n[i] * 1e6 / (double)(to_us - from_us), 5);
+        evr_put_number(t, (double)n * 1e6 / (double)(to_us - from_us), 5);
         comma = ",";
     }
     evr_put(t, "]");
@@ -138,7 +148,7 @@ static void put_span(evr_text_t *t, const evr_report_t *r)
     put_seconds(t, f->first_us - r->first_us);
     evr_put(t, ",\"to_s\":");
     put_seconds(t, f->last_us - r->first_us);
-    evr_printf(t, ",\"shaken\":%s", (r->spans.best_good && (f->shake.n > 0u)) ? "true" : "false");
+    evr_printf(t, ",\"shaken\":%s", (r->spans.best_good && (f->shake.rate_rad_s > STILL_RAD_S)) ? "true" : "false");
     evr_printf(t, ",\"rate_deg_s\":%.5g,\"motion_px_s\":%.5g", f->shake.rate_rad_s * 57.29577951308232,
                f->shake.motion_px_s);
     evr_printf(t, ",\"sharpness\":[%.6g,%.6g],\n\"before\":", f->before, f->after);

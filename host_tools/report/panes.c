@@ -14,12 +14,11 @@ evr_panes_t evr_panes_layout(uint16_t width_px, uint16_t height_px)
     return p;
 }
 
-/* 1/16 px to a cell, by the nearest pixel. */
+/* 1/16 px to a cell, by the nearest pixel: counted from -2048 cells, where nothing is negative. */
 static int cell_of(int16_t q4, int bin)
 {
-    const int one = 16 * bin;
-    const int shifted = q4 + 8;
-    return (shifted >= 0) ? shifted / one : -((one - 1 - shifted) / one);
+    const unsigned shifted = (unsigned)(q4 + 2048 * 16 * bin + 8);
+    return (int)((bin == 1) ? shifted / 16u : shifted / (16u * (unsigned)bin)) - 2048;
 }
 
 static void count(uint8_t *cell, bool brighter)

@@ -16,6 +16,7 @@ bool evr_png_encode(evr_png_t *png, const uint8_t *grey, int width, int height)
     image.width = (png_uint_32)width;
     image.height = (png_uint_32)height;
     image.format = PNG_FORMAT_GRAY;
+    image.flags = PNG_IMAGE_FLAG_FAST; /* Few events, many zeros: filters cost time and gain nothing. */
     if (png_image_write_to_memory(&image, NULL, &n, 0, grey, 0, NULL) == 0) { return false; }
     png->bytes = malloc(n);
     if (png->bytes == NULL) { return false; }

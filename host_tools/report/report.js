@@ -49,7 +49,7 @@ function short(x) { /* 1.2 M */
   return digits(x, 3);
 }
 function seconds(s) {
-  if (s < 1) { return digits(s * 1e3, 3) + " ms"; }
+  if (s < 0.9995) { return digits(s * 1e3, 3) + " ms"; }
   if (s < 120) { return digits(s, 4) + " s"; }
   return Math.floor(s / 60) + " min " + Math.round(s % 60) + " s";
 }
@@ -161,7 +161,7 @@ async function beforeAndAfter() {
     const words = new Uint32Array(image.data.buffer);
     const ground = rgb("--picture");
     const ink = rgb("--count");
-    const shade = Array.from({ length: 256 }, (_, v) => pack(blend(ground, ink, Math.min(1, Math.pow(v / top, 0.6)))));
+    const shade = Array.from({ length: 256 }, (_, v) => pack(blend(ground, ink, Math.min(1, Math.pow(v / top, 0.5)))));
     for (let i = 0; i < words.length; i++) { words[i] = shade[picture.grey[i]]; }
     context.putImageData(image, 0, 0);
   };
@@ -172,7 +172,7 @@ async function beforeAndAfter() {
 
   const span = seconds(s.to_s - s.from_s);
   const g = gain(s.sharpness);
-  const why = s.shaken ? "The span in which the camera turned fastest" : "The span with most events";
+  const why = numbers.spans === 1 ? "The whole recording" : s.shaken ? "The span in which the camera turned fastest" : "The span with most events";
   const rate = hasRotation ? " at " + digits(s.rate_deg_s, 3) + " \u00b0/s (" + digits(s.motion_px_s, 3) + " px/s at the image centre)" : "";
   $("before").setAttribute("aria-label", "Picture of " + count(s.n_events) + " raw events, sharpness " + digits(s.sharpness[0], 3));
   $("after").setAttribute("aria-label", "The same events stabilized, sharpness " + digits(s.sharpness[1], 3));
@@ -304,7 +304,7 @@ async function animation() {
   $("exposure").addEventListener("change", draw);
   repaint.push(() => { table = pictureColours(); draw(); });
 
-  const rate = hasRotation ? "The " + seconds(length_s) + " in which the camera turned fastest (" + digits(clip.rate_deg_s, 3) + " \u00b0/s in the mean). " : "";
+  const rate = hasRotation && length_s < data.duration_s * 0.9 && clip.rate_deg_s > 0.5 ? "The " + seconds(length_s) + " in which the camera turned fastest (" + digits(clip.rate_deg_s, 3) + " \u00b0/s in the mean). " : "";
   $("clip-caption").textContent = rate + "Blue: it got brighter; orange: darker. The dashed frame on the canvas is the stabilized pane" +
     (clip.bin > 1 ? "; " + clip.bin + "\u00d7" + clip.bin + " pixels of the sensor make one of a pane" : "") + ".";
   $("clip").hidden = false;
@@ -365,7 +365,8 @@ function plot(p) {
   const classes = COLOURS[p.curves.length] || COLOURS[3];
   const keys = p.curves.map(() => make("b", {}));
   const key = make("div", { class: "key" });
-  p.curves.forEach((c, i) => key.append(make("span", {}, make("i", { class: classes[i] }), p.curves.length > 1 ? c.name + " " : "", keys[i])));
+  if (p.curves.length === 1) { key.append(keys[0]); }
+  else { p.curves.forEach((c, i) => key.append(make("span", {}, make("i", { class: classes[i] }), c.name + " ", keys[i]))); }
   if (p.id === "attitude" && data.saccades.n > 0) { key.append(make("span", {}, make("i", { class: "c-mark" }), "saccade")); }
   const name = make("span", { class: "name" }, p.title + " ", make("small", {}, "in " + p.unit));
   if (p.base !== undefined) { name.lastChild.textContent = p.unit; }
@@ -391,12 +392,12 @@ function plot(p) {
     const Y = (v) => height - edge.bottom - (v - low) / (high - low) * (height - edge.top - edge.bottom);
     const ms = to < 1;
     const s = svg("svg", { viewBox: "0 0 " + width + " " + height, height, role: "img", "aria-label": p.title + " over time, in " + p.unit + ": " + spoken });
-    const ty = ticks(low, high, 4);
+    const ty = ticks(low, high, 5);
     for (const v of ty.list) {
       s.append(svg("line", { x1: edge.left, x2: width - edge.right, y1: Y(v), y2: Y(v), class: "gridline" }));
       s.append(svg("text", { x: edge.left - 7, y: Y(v) + 4, "text-anchor": "end" }, tickText(v, ty)));
     }
-    const tx = ticks(from * (ms ? 1e3 : 1), to * (ms ? 1e3 : 1), width / 90);
+    const tx = ticks(from * (ms ? 1e3 : 1), to * (ms ? 1e3 : 1), width / 60);
     for (const v of tx.list) {
       const x = X(v / (ms ? 1e3 : 1));
       s.append(svg("line", { x1: x, x2: x, y1: height - edge.bottom, y2: height - edge.bottom + 4, class: "axis" }));
@@ -411,13 +412,15 @@ function plot(p) {
       for (let k = 0; k < c.points.length; k += 2) {
         path += (k === 0 ? "M" : "L") + X(c.points[k]).toFixed(1) + " " + Y(c.points[k + 1]).toFixed(1);
       }
-      if (c.points.length === 2) { path += "h2"; }
       if (c.fill) {
         const end = c.points.length - 2;
         s.append(svg("path", { d: path + "L" + X(c.points[end]).toFixed(1) + " " + Y(low) + "L" + X(c.points[0]).toFixed(1) + " " + Y(low) + "Z",
           fill: "currentColor", "fill-opacity": "0.15", class: classes[i] }));
       }
       s.append(svg("path", { d: path, stroke: "currentColor", class: "curve " + classes[i] }));
+      for (let k = 0; c.points.length <= 2 * 100 && k < c.points.length; k += 2) { /* Few points are seen one by one. */
+        s.append(svg("circle", { cx: X(c.points[k]).toFixed(1), cy: Y(c.points[k + 1]).toFixed(1), r: 2, class: "dot " + classes[i] }));
+      }
     });
     const cursor = svg("line", { y1: edge.top, y2: height - edge.bottom, class: "cursor", visibility: "hidden" });
     s.append(cursor);
@@ -463,6 +466,17 @@ const WORDS = {
 };
 const plain = (key) => WORDS[key] || key.replace(/_/g, " ");
 
+/* "slice_max_us", 1000 as "slice max", "1000 us". */
+const UNITS = { us: " \u00b5s", px: " px", s: " s" };
+function setting(key, value) {
+  const at = key.lastIndexOf("_");
+  const unit = UNITS[key.slice(at + 1)];
+  if (key === "saccade_px" && value === 0) { return ["saccade", "off"]; }
+  if (typeof value === "boolean") { return [plain(key), value ? "yes" : "no"]; }
+  if (Array.isArray(value)) { return [plain(key), value.map((v) => digits(v, 6)).join(", ")]; }
+  return unit === undefined || typeof value !== "number" ? [plain(key), String(value)] : [plain(key.slice(0, at)), String(value) + unit];
+}
+
 function eventTable() {
   const e = summary.events;
   const rows = [["read from the file", e.in, false]];
@@ -496,7 +510,7 @@ function settingsTable() {
   const row = (name, value) => table.append(make("tr", {}, make("th", { scope: "row" }, name), make("td", {}, value)));
   for (const [key, value] of Object.entries(settings)) {
     if (value === null || key === "camera") { continue; }
-    row(plain(key), Array.isArray(value) ? value.map((v) => digits(v, 6)).join(", ") : typeof value === "boolean" ? (value ? "yes" : "no") : String(value));
+    row(...setting(key, value));
   }
   const c = settings.camera;
   row("lens", c.model + ", focal length " + digits(c.fx_px, 5) + " \u00d7 " + digits(c.fy_px, 5) + " px, centre " + digits(c.cx_px, 5) + ", " +

@@ -51,13 +51,26 @@ void evr_counts_clear(evr_counts_t *c)
     c->width_us = EVR_SERIES_WIDTH_US;
 }
 
-void evr_counts_add(evr_counts_t *c, int64_t t_us)
+static void halve_counts(evr_counts_t *c)
 {
-    if (t_us < 0) { return; }
-    while (t_us / c->width_us >= (int64_t)EVR_SERIES_BINS) {
-        for (size_t i = 0u; i < EVR_SERIES_BINS / 2u; i++) { c->n[i] = c->n[2u * i] + c->n[2u * i + 1u]; }
-        memset(&c->n[EVR_SERIES_BINS / 2u], 0, EVR_SERIES_BINS / 2u * sizeof c->n[0]);
-        c->width_us *= 2;
+    for (size_t i = 0u; i < EVR_SERIES_BINS / 2u; i++) { c->n[i] = c->n[2u * i] + c->n[2u * i + 1u]; }
+    memset(&c->n[EVR_SERIES_BINS / 2u], 0, EVR_SERIES_BINS / 2u * sizeof c->n[0]);
+    c->width_us *= 2;
+}
+
+void evr_counts_add(evr_counts_t *c, int64_t start_us, const int64_t *t_us, size_t n)
+{
+    size_t i = 0u;
+    while (i < n) { /* A bin at a time, not a division for every event. */
+        const int64_t t = t_us[i] - start_us;
+        size_t end = i + 1u;
+        if (t >= 0) {
+            int64_t from_us;
+            while (t / c->width_us >= (int64_t)EVR_SERIES_BINS) { halve_counts(c); }
+            from_us = t_us[i] - t % c->width_us;
+            while ((end < n) && (t_us[end] >= from_us) && (t_us[end] - from_us < c->width_us)) { end++; }
+            c->n[t / c->width_us] += end - i;
+        }
+        i = end;
     }
-    c->n[t_us / c->width_us]++;
 }

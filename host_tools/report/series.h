@@ -47,6 +47,8 @@ typedef struct {
 } evr_counts_t;
 
 void evr_counts_clear(evr_counts_t *c);
-void evr_counts_add(evr_counts_t *c, int64_t t_us);
+
+/** n things at times in order, each less start_us. */
+void evr_counts_add(evr_counts_t *c, int64_t start_us, const int64_t *t_us, size_t n);
 
 #endif
