@@ -1,0 +1,170 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+# SPDX-FileCopyrightText: 2026 the evstab authors
+"""Replays a small made-up recording and opens report.html in a browser: nothing may fail, nothing may be fetched, and the
+page must have drawn what the recording holds, in the light and in the dark theme.
+
+usage: report.py EVSTAB
+
+Exits 77 when chromium is not there; what needs no browser is checked before.
+"""
+import html
+import json
+import math
+import os
+import pathlib
+import random
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+
+FAULTS = []
+SECONDS, FOCAL, WIDTH, HEIGHT = 1.5, 200.0, 240, 180
+NAME = """fl<i>ght & "co" 'x' <script>.d"""  # Markup that must stay text.
+
+
+def check(what, ok, detail=""):
+    print(f"{'ok  ' if ok else 'FAIL'} {what}: {detail}")
+    if not ok:
+        FAULTS.append(what)
+
+
+def yaw(t):
+    """The camera looks around while it is shaken: far enough for saccades."""
+    return math.radians(60.0) * t + math.radians(6.0) * math.sin(2.0 * math.pi * 5.0 * t)
+
+
+def yaw_rate(t):
+    return math.radians(60.0) + math.radians(6.0) * 2.0 * math.pi * 5.0 * math.cos(2.0 * math.pi * 5.0 * t)
+
+
+def make_recording(folder):
+    """Points infinitely far away, seen by a camera that turns about its vertical axis."""
+    draw = random.Random(1)
+    points = [(draw.uniform(-0.7, 2.4), draw.uniform(-0.4, 0.4)) for _ in range(150)]
+    folder.mkdir()
+    (folder / "calib.txt").write_text(f"{FOCAL} {FOCAL} 119.5 89.5 0 0 0 0 0\n")
+    with open(folder / "imu.txt", "w", encoding="ascii") as f:
+        for i in range(-200, int(SECONDS * 1000) + 50):
+            f.write(f"{1 + i / 1000:.6f} 0 -9.81 0 0 {yaw_rate(max(i, 0) / 1000) if i >= 0 else 0:.9f} 0\n")
+    with open(folder / "events.txt", "w", encoding="ascii") as f:
+        for i in range(90000):
+            t = i / 90000 * SECONDS
+            azimuth, height = draw.choice(points)
+            angle = azimuth - yaw(t)
+            x = round(FOCAL * math.tan(angle) + 119.5) if abs(angle) < 0.6 else -1
+            y = round(FOCAL * height / math.cos(angle) + 89.5)
+            if 0 <= x < WIDTH and 0 <= y < HEIGHT:
+                f.write(f"{1 + t:.6f} {x} {y} {i & 1}\n")
+            if i % 10000 == 5000:
+                f.write("this is no event\n")
+
+
+def evstab(program, *arguments, **options):
+    return subprocess.run([program, *map(str, arguments)], text=True, capture_output=True, timeout=120, **options)
+
+
+def browse(page, temp, *flags):
+    """@return what the page says about itself, and what the browser says about the page."""
+    profile = pathlib.Path(tempfile.mkdtemp(dir=temp))
+    net_log = profile / "net.json"
+    done = subprocess.run(
+        ["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking",
+         "--disable-component-update", "--disable-sync", "--disable-extensions", "--disable-default-apps",
+         "--disable-dev-shm-usage", f"--user-data-dir={profile}", f"--log-net-log={net_log}", "--enable-logging=stderr",
+         "--host-resolver-rules=MAP * ~NOTFOUND", "--virtual-time-budget=20000", "--window-size=1000,900", *flags, "--dump-dom", page.as_uri()],
+        text=True, capture_output=True, timeout=240)
+    status = re.search(r'<p id="status" hidden="">(.*?)</p>', done.stdout, re.S)
+    console = [line for line in done.stderr.splitlines() if "CONSOLE" in line]
+    # What a page asks for has an initiator; what the browser wants for itself (and does not get here) has none.
+    log = net_log.read_text(errors="replace")
+    requests = [line for line in log.splitlines()
+                if re.search(r'"url":"(?!file:|data:|chrome|devtools:)', line) and '"initiator":"' in line and
+                '"initiator":"not an origin"' not in line]
+    return (json.loads(html.unescape(status[1])) if status else None), console, requests, done.stdout
+
+
+def check_page(page, temp, theme, flags, summary):
+    status, console, requests, dom = browse(page, temp, *flags)
+    check(f"{theme}: the script ran to its end", status is not None and status["ready"], status)
+    if status is None:
+        return
+    check(f"{theme}: theme", status["theme"] == theme, status["theme"])
+    check(f"{theme}: no errors", not status["errors"] and not console, (status["errors"], console))
+    check(f"{theme}: nothing fetched", status["resources"] == 0 and not requests, (status["resources"], requests))
+    for plot in ("attitude", "rate", "events", "window", "gain"):
+        curves = 3 if plot in ("attitude", "rate") else 1
+        n = status["plots"].get(plot, 0)
+        check(f"{theme}: plot {plot}", 2 * curves < n <= 2000 * curves, f"{n} points")
+    check(f"{theme}: animation", status["pictures"] >= 50, f"{status['pictures']} pictures")
+    check(f"{theme}: before and after", status["span"]["before"] > 300 and 100 < status["span"]["after"],
+          status["span"])
+    check(f"{theme}: the name is text", f"<h1>{html.escape(NAME, quote=False)}</h1>" in dom and "<i>ght" not in dom, NAME)
+    check(f"{theme}: counts", f"{summary['saccades']} saccades" in dom and "skipped:" in dom, "saccades, skipped lines")
+
+
+def check_video(program, folder, temp):
+    empty = temp / "empty"
+    empty.mkdir()
+    out = temp / "no_ffmpeg"
+    done = evstab(program, "replay", folder, "-o", out, "--video", temp / "v.mp4", env={**os.environ, "PATH": str(empty)})
+    check("without ffmpeg: exit status and one line", done.returncode == 1 and done.stderr.count("\n") == 1 and
+          "ffmpeg" in done.stderr, done.stderr)
+    check("without ffmpeg: told before any work", not out.exists())
+    done = evstab(program, "replay", folder, "-o", out, "--video", temp / "v.avi")
+    check("a video of another kind is refused", done.returncode == 2 and ".mp4" in done.stderr, done.stderr)
+    if shutil.which("ffmpeg") is None:
+        print("no ffmpeg here: no video made")
+        return
+    for name in ("-odd name;$(x).mp4", "small.gif"):
+        done = evstab(program, "replay", folder, "-o", out, "--no-report", "--video", name, cwd=temp)
+        check(f"video {name}", done.returncode == 0 and (temp / name).stat().st_size > 5000, done.stderr)
+    done = evstab(program, "replay", folder, "-o", out, "--no-report", "--video", empty / "no" / "such.mp4")
+    check("a video that cannot be written fails", done.returncode == 1 and "ffmpeg failed" in done.stderr, done.stderr)
+
+
+def main():
+    if len(sys.argv) != 2:
+        print(__doc__)
+        sys.exit(2)
+    program = str(pathlib.Path(sys.argv[1]).resolve())
+    with tempfile.TemporaryDirectory(prefix="evstab_report_", ignore_cleanup_errors=True) as name:
+        temp = pathlib.Path(name)
+        folder, out = temp / NAME, temp / "out"
+        make_recording(folder)
+        done = evstab(program, "replay", folder, "-o", out, "--window", "time:20000")
+        print(done.stderr, end="")
+        if done.returncode != 0:
+            print(f"FAIL evstab replay exits {done.returncode}")
+            sys.exit(1)
+        page = out / "report.html"
+        text = page.read_text(encoding="utf-8")
+        summary = json.loads((out / "summary.json").read_text())
+        data = json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.S)[1])
+        check("size", 50_000 < len(text) < 3_000_000, f"{len(text)} bytes")
+        check("no address but that of SVG", set(re.findall(r"https?://[^\"' ]+", text)) == {"http://www.w3.org/2000/svg"})
+        check("settings and counts are those of summary.json", data["summary"] == summary)
+        check("saccades", data["saccades"]["n"] == summary["saccades"] > 0, data["saccades"])
+        before, after = data["numbers"]["spans_sharpness"]
+        check("sharpness gain", after > 1.5 * before, f"{before} -> {after}")
+        mean = math.degrees(sum(abs(yaw_rate(i / 1000)) for i in range(int(SECONDS * 1000))) / (SECONDS * 1000))
+        check("rotation removed", abs(data["numbers"]["rate_deg_s"][0] - mean) < 0.03 * mean,
+              f"{data['numbers']['rate_deg_s'][0]} deg/s, made {mean:.1f}")
+        turn = data["plots"][0]["curves"][1]["points"][-1]
+        check("attitude", abs(turn - math.degrees(yaw(SECONDS))) < 2.0, f"yaw {turn} deg at the end")
+        done = evstab(program, "replay", folder, "-o", temp / "bare", "--no-report")
+        check("--no-report", done.returncode == 0 and not (temp / "bare" / "report.html").exists())
+        check_video(program, folder, temp)
+        if shutil.which("chromium") is None:
+            print("SKIPPED: chromium is not installed; the page was not opened")
+            sys.exit(1 if FAULTS else 77)
+        check_page(page, temp, "light", ["--blink-settings=preferredColorScheme=1"], summary)
+        check_page(page, temp, "dark", ["--blink-settings=preferredColorScheme=0"], summary)
+    print(f"{len(FAULTS)} faults")
+    sys.exit(1 if FAULTS else 0)
+
+
+if __name__ == "__main__":
+    main()
