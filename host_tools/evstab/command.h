@@ -14,6 +14,7 @@
 /** @param argv  argv[0] is the command's own name. @return the exit status. */
 int evt_attitude_main(int argc, char **argv);
 int evt_bench_main(int argc, char **argv);
+int evt_demo_main(int argc, char **argv);
 int evt_eval_main(int argc, char **argv);
 int evt_info_main(int argc, char **argv);
 int evt_lut_main(int argc, char **argv);

@@ -11,6 +11,7 @@ static const struct {
     const char *summary;
     int (*run)(int argc, char **argv);
 } COMMANDS[] = {
+    {"demo", "a simulated flight, stabilized, as a page to look at", evt_demo_main},
     {"replay", "a recording through the library: stabilized events, windows, attitude", evt_replay_main},
     {"attitude", "the attitude filter alone, on the samples of an IMU", evt_attitude_main},
     {"eval", "what a run found against the truth: attitude, velocity, sharpness", evt_eval_main},
