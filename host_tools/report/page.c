@@ -13,7 +13,7 @@
 #include "text.h"
 
 /* base64 of pictures; what does not fit is left out, from the end. Keeps the page within about 3 MB. */
-#define CLIP_BYTES_MAX 2100000u
+#define CLIP_BYTES_MAX 2400000u
 
 #define RATE_STEPS 300
 
@@ -126,10 +126,10 @@ static void put_saccades(evr_text_t *t, const evr_report_t *r)
     evr_put(t, "]}");
 }
 
-static void put_png(evr_text_t *t, const uint8_t *grey, int width, int height)
+static void put_png(evr_text_t *t, const uint8_t *grey, int width, int height, int bits)
 {
     evr_png_t png;
-    if (!evr_png_encode(&png, grey, width, height)) {
+    if (!evr_png_encode(&png, grey, width, height, bits)) {
         t->failed = true;
         return;
     }
@@ -152,21 +152,30 @@ static void put_span(evr_text_t *t, const evr_report_t *r)
     evr_printf(t, ",\"rate_deg_s\":%.5g,\"motion_px_s\":%.5g", f->shake.rate_rad_s * 57.29577951308232,
                f->shake.motion_px_s);
     evr_printf(t, ",\"sharpness\":[%.6g,%.6g],\n\"before\":", f->before, f->after);
-    put_png(t, r->spans.best_before, r->width_px, r->height_px);
+    put_png(t, r->spans.best_before, r->width_px, r->height_px, 8);
     evr_put(t, ",\n\"after\":");
-    put_png(t, r->spans.best_after, r->width_px, r->height_px);
+    put_png(t, r->spans.best_after, r->width_px, r->height_px, 8);
     evr_put(t, "}");
+}
+
+/* Counts as they are shown, 2 bits each: none, one, two, more. */
+static uint8_t shown(uint8_t cell)
+{
+    const unsigned brighter = cell & 15u;
+    const unsigned darker = cell >> 4;
+    return (uint8_t)(((brighter < 3u) ? brighter : 3u) | (((darker < 3u) ? darker : 3u) << 2));
 }
 
 /* One picture as one PNG: the pane at the left, the canvas at the right of it. */
 static void lay_out(const evr_panes_t *p, const uint8_t *picture, uint8_t *sheet)
 {
     const size_t w = (size_t)p->width;
+    const size_t h = (size_t)p->height;
     const uint8_t *const canvas = picture + evr_panes_canvas_at(p);
-    for (size_t y = 0u; y < 2u * (size_t)p->height; y++) {
+    for (size_t y = 0u; y < 2u * h; y++) {
         uint8_t *const row = sheet + y * 3u * w;
-        if (y < (size_t)p->height) { memcpy(row, picture + y * w, w); }
-        memcpy(row + w, canvas + y * 2u * w, 2u * w);
+        for (size_t x = 0u; (y < h) && (x < w); x++) { row[x] = shown(picture[y * w + x]); }
+        for (size_t x = 0u; x < 2u * w; x++) { row[w + x] = shown(canvas[y * 2u * w + x]); }
     }
 }
 
@@ -186,7 +195,7 @@ static void put_clip(evr_text_t *t, const evr_report_t *r)
     for (int i = 0; (i < r->take->n) && (t->n < limit); i++) {
         lay_out(p, r->take->pictures + (size_t)i * p->n_cells, sheet);
         evr_put(t, (i > 0) ? ",\n" : "\n");
-        put_png(t, sheet, 3 * p->width, 2 * p->height);
+        put_png(t, sheet, 3 * p->width, 2 * p->height, 4);
     }
     evr_put(t, "]}");
     free(sheet);

@@ -172,7 +172,7 @@ async function beforeAndAfter() {
 
   const span = seconds(s.to_s - s.from_s);
   const g = gain(s.sharpness);
-  const why = numbers.spans === 1 ? "The whole recording" : s.shaken ? "The span in which the camera turned fastest" : "The span with most events";
+  const why = numbers.spans === 1 ? "The whole recording," : s.shaken ? "The span (of 30 ms at least) in which the camera turned fastest," : "The span with most events";
   const rate = hasRotation ? " at " + digits(s.rate_deg_s, 3) + " \u00b0/s (" + digits(s.motion_px_s, 3) + " px/s at the image centre)" : "";
   $("before").setAttribute("aria-label", "Picture of " + count(s.n_events) + " raw events, sharpness " + digits(s.sharpness[0], 3));
   $("after").setAttribute("aria-label", "The same events stabilized, sharpness " + digits(s.sharpness[1], 3));
@@ -200,7 +200,15 @@ async function beforeAndAfter() {
 
 /* --- animation ---------------------------------------------------------------------------------------------------- */
 
-/* A picture is a byte a cell: brighter events in the low half, darker ones in the high half. */
+/* A cell comes as 2 bits of brighter and 2 bits of darker events (0, 1, 2, more), spread over the greys of a PNG of 4 bits;
+ * here it is a byte, brighter events in the low half, darker ones in the high half, so that cells can be summed. */
+async function decodePicture(base64) {
+  const picture = await decode(base64);
+  const COUNT = [0, 1, 2, 4];
+  picture.grey.forEach((v, i) => { if (v !== 0) { picture.grey[i] = COUNT[(v / 17) & 3] | (COUNT[(v / 17) >> 2] << 4); } });
+  return picture;
+}
+
 function pictureColours() {
   const ground = rgb("--picture");
   const brighter = rgb("--brighter");
@@ -246,7 +254,7 @@ function paintPane(id, cells, stride, left, top, width, height, table) {
 async function animation() {
   const clip = data.clip;
   if (!clip) { return; }
-  const pictures = await Promise.all(clip.pictures.map(decode));
+  const pictures = await Promise.all(clip.pictures.map(decodePicture));
   const w = clip.width;
   const h = clip.height;
   const n = pictures.length;
@@ -343,7 +351,8 @@ function range(plot) {
   return [low === 0 ? 0 : low - margin, high + margin];
 }
 function tickText(v, t) {
-  if (t.step >= 1e3) { return short(v); }
+  const k = t.step >= 5e5 ? 1e6 : t.step >= 500 ? 1e3 : 1;
+  if (k > 1) { return v === 0 ? "0" : String(Number((v / k).toPrecision(4))) + THIN + (k === 1e6 ? "M" : "k"); }
   const text = Math.abs(v).toFixed(t.decimals);
   return (v < 0 && Number(text) !== 0 ? MINUS : "") + text;
 }

@@ -78,12 +78,15 @@ static void test_a_picture_becomes_a_png(void)
     static const uint8_t SIGNATURE[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
     const uint8_t grey[6] = {0u, 1u, 2u, 253u, 254u, 255u};
     evr_png_t png;
-    TEST_ASSERT_TRUE(evr_png_encode(&png, grey, 3, 2));
+    TEST_ASSERT_TRUE(evr_png_encode(&png, grey, 3, 2, 8));
     TEST_ASSERT_EQUAL_UINT8_ARRAY(SIGNATURE, png.bytes, 8);
     TEST_ASSERT_EQUAL_UINT8(3u, png.bytes[19]); /* IHDR: width */
     TEST_ASSERT_EQUAL_UINT8(2u, png.bytes[23]); /* height */
     TEST_ASSERT_EQUAL_UINT8(8u, png.bytes[24]); /* bits */
     TEST_ASSERT_EQUAL_UINT8(0u, png.bytes[25]); /* grey */
+    free(png.bytes);
+    TEST_ASSERT_TRUE(evr_png_encode(&png, grey, 3, 1, 4));
+    TEST_ASSERT_EQUAL_UINT8(4u, png.bytes[24]);
     free(png.bytes);
 }
 
