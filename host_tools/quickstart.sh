@@ -5,7 +5,7 @@
 # From a fresh clone on Debian 12 or Ubuntu 24.04 to a result, in one command:
 #
 #   sh host_tools/quickstart.sh test    install what is missing, build everything, run every test
-#   sh host_tools/quickstart.sh demo    comes with the next release
+#   sh host_tools/quickstart.sh demo    install what is missing, build evstab, simulate and stabilize a flight, write a report
 #
 # What is there already is left alone: a second run installs nothing. Everything built lies in build/.
 set -eu
@@ -29,24 +29,27 @@ need_package() {
     if [ "$(dpkg-query -W -f='${db:Status-Status}' "$1" 2>/dev/null)" != installed ]; then missing="$missing $1"; fi
 }
 
-install_missing() {
-    command -v apt-get >/dev/null 2>&1 || {
-        echo "quickstart: needs apt (Debian 12, Ubuntu 24.04); elsewhere see docs/porting.md" >&2
-        exit 1
-    }
+# What building and running evstab needs.
+need_for_evstab() {
     need gcc gcc
-    need g++ g++ # The headers must compile as C++ too.
-    need clang clang
     need cmake cmake
     need ninja ninja-build
     need pkg-config pkg-config
-    need python3 python3
-    python3 -c 'import ensurepip, venv' 2>/dev/null || missing="$missing python3-venv"
     need_package libc6-dev
     need_package zlib1g-dev   # evstab reads .gz
     need_package libyaml-dev  # evstab reads the settings of the paper's code
     need_package libcjson-dev # and writes summary.json
-    for p in libpng-dev libjpeg-dev; do need_package "$p"; done # evstab sim reads textures and writes frames
+    for p in libpng-dev libjpeg-dev; do need_package "$p"; done # evstab sim reads textures and writes frames; the report
+}
+
+# What the tests need beyond that.
+need_for_tests() {
+    need g++ g++ # The headers must compile as C++ too.
+    need clang clang
+    need python3 python3
+    python3 -c 'import ensurepip, venv' 2>/dev/null || missing="$missing python3-venv"
+    # A browser for the test of the report. Where it comes as a snap (Ubuntu) that test is skipped.
+    if grep -q '^ID=debian' /etc/os-release 2>/dev/null; then need chromium chromium; fi
     # The emulated targets. picolibc is for the tests on them: the library needs no C library.
     need arm-none-eabi-gcc gcc-arm-none-eabi
     need riscv64-unknown-elf-gcc gcc-riscv64-unknown-elf
@@ -54,7 +57,13 @@ install_missing() {
     need_package picolibc-riscv64-unknown-elf
     need qemu-system-arm qemu-system-arm
     need qemu-system-riscv32 qemu-system-misc
+}
 
+install_missing() {
+    command -v apt-get >/dev/null 2>&1 || {
+        echo "quickstart: needs apt (Debian 12, Ubuntu 24.04); elsewhere see docs/porting.md" >&2
+        exit 1
+    }
     if [ -z "$missing" ]; then return; fi
     say "installing:$missing"
     as_root=
@@ -97,8 +106,24 @@ build_and_test() {
     ctest --test-dir "build/$name" --output-on-failure --no-tests=error -LE "$skip" -j "$(nproc)"
 }
 
+run_demo() {
+    need_for_evstab
+    install_missing
+    say "build"
+    mkdir -p build
+    cmake -S . -B build/demo -G Ninja -DCMAKE_BUILD_TYPE=Release -DEVS_BUILD_TESTS=OFF >build/demo.log 2>&1 || {
+        cat build/demo.log >&2
+        exit 1
+    }
+    cmake --build build/demo -- --quiet
+    say "demo"
+    build/demo/host_tools/evstab demo -o "$root/build/evstab_demo"
+}
+
 run_tests() {
     mkdir -p build
+    need_for_evstab
+    need_for_tests
     install_missing
     make_venv
     # What does not depend on how the library was compiled runs once, in the last build.
@@ -112,9 +137,6 @@ run_tests() {
 [ $# -eq 1 ] || usage
 case $1 in
 test) run_tests ;;
-demo)
-    echo "quickstart: the demo comes with the next release; 'test' works today" >&2
-    exit 2
-    ;;
+demo) run_demo ;;
 *) usage ;;
 esac

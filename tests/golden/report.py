@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 # SPDX-FileCopyrightText: 2026 the evstab authors
-"""Replays a small made-up recording and opens report.html in a browser: nothing may fail, nothing may be fetched, and the
-page must have drawn what the recording holds, in the light and in the dark theme.
+"""Replays a small made-up recording and opens report.html in a browser: nothing may fail, nothing may be fetched, and
+the page must have drawn what the recording holds, in the light and in the dark theme. Videos and the demo are tried too.
 
 usage: report.py EVSTAB
 
@@ -74,7 +74,8 @@ def browse(page, temp, *flags):
         ["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking",
          "--disable-component-update", "--disable-sync", "--disable-extensions", "--disable-default-apps",
          "--disable-dev-shm-usage", f"--user-data-dir={profile}", f"--log-net-log={net_log}", "--enable-logging=stderr",
-         "--host-resolver-rules=MAP * ~NOTFOUND", "--virtual-time-budget=20000", "--window-size=1000,900", *flags, "--dump-dom", page.as_uri()],
+         "--host-resolver-rules=MAP * ~NOTFOUND", "--virtual-time-budget=20000", "--window-size=1000,900", *flags, "--dump-dom",
+         page.as_uri()],
         text=True, capture_output=True, timeout=240)
     status = re.search(r'<p id="status" hidden="">(.*?)</p>', done.stdout, re.S)
     console = [line for line in done.stderr.splitlines() if "CONSOLE" in line]
@@ -101,7 +102,8 @@ def check_page(page, temp, theme, flags, summary):
     check(f"{theme}: animation", status["pictures"] >= 50, f"{status['pictures']} pictures")
     check(f"{theme}: before and after", status["span"]["before"] > 300 and 100 < status["span"]["after"],
           status["span"])
-    check(f"{theme}: the name is text", f"<h1>{html.escape(NAME, quote=False)}</h1>" in dom and "<i>ght" not in dom, NAME)
+    check(f"{theme}: the name is text", f"<h1>{html.escape(NAME, quote=False)}</h1>" in dom and "<i>ght" not in dom,
+          NAME)
     check(f"{theme}: counts", f"{summary['saccades']} saccades" in dom and "skipped:" in dom, "saccades, skipped lines")
 
 
@@ -109,7 +111,8 @@ def check_video(program, folder, temp):
     empty = temp / "empty"
     empty.mkdir()
     out = temp / "no_ffmpeg"
-    done = evstab(program, "replay", folder, "-o", out, "--video", temp / "v.mp4", env={**os.environ, "PATH": str(empty)})
+    done = evstab(program, "replay", folder, "-o", out, "--video", temp / "v.mp4",
+                  env={**os.environ, "PATH": str(empty)})
     check("without ffmpeg: exit status and one line", done.returncode == 1 and done.stderr.count("\n") == 1 and
           "ffmpeg" in done.stderr, done.stderr)
     check("without ffmpeg: told before any work", not out.exists())
@@ -123,6 +126,18 @@ def check_video(program, folder, temp):
         check(f"video {name}", done.returncode == 0 and (temp / name).stat().st_size > 5000, done.stderr)
     done = evstab(program, "replay", folder, "-o", out, "--no-report", "--video", empty / "no" / "such.mp4")
     check("a video that cannot be written fails", done.returncode == 1 and "ffmpeg failed" in done.stderr, done.stderr)
+
+
+def check_demo(program, temp):
+    out = temp / "demo"
+    done = evstab(program, "demo", "-o", out, "--duration", "0.3", "--quiet")
+    check("demo", done.returncode == 0 and (out / "report.html").exists() and (out / "flight" / "events.txt").exists(),
+          done.stderr)
+    lines = done.stdout.splitlines()
+    check("demo: three numbers and where to look", len(lines) == 5 and lines[4] == f"look at {out}/report.html" and
+          [line.split()[0] for line in lines[1:4]] == ["sharpness", "rotation", "speed"], done.stdout)
+    gain = re.search(r"x([0-9.]+):", done.stdout)
+    check("demo: stabilization shows", gain is not None and float(gain[1]) > 1.3, done.stdout)
 
 
 def main():
@@ -144,7 +159,8 @@ def main():
         summary = json.loads((out / "summary.json").read_text())
         data = json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.S)[1])
         check("size", 50_000 < len(text) < 3_000_000, f"{len(text)} bytes")
-        check("no address but that of SVG", set(re.findall(r"https?://[^\"' ]+", text)) == {"http://www.w3.org/2000/svg"})
+        addresses = set(re.findall(r"https?://[^\"' ]+", text))
+        check("no address but that of SVG", addresses == {"http://www.w3.org/2000/svg"}, addresses)
         check("settings and counts are those of summary.json", data["summary"] == summary)
         check("saccades", data["saccades"]["n"] == summary["saccades"] > 0, data["saccades"])
         before, after = data["numbers"]["spans_sharpness"]
@@ -157,6 +173,7 @@ def main():
         done = evstab(program, "replay", folder, "-o", temp / "bare", "--no-report")
         check("--no-report", done.returncode == 0 and not (temp / "bare" / "report.html").exists())
         check_video(program, folder, temp)
+        check_demo(program, temp)
         if shutil.which("chromium") is None:
             print("SKIPPED: chromium is not installed; the page was not opened")
             sys.exit(1 if FAULTS else 77)

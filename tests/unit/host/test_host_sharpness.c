@@ -43,9 +43,7 @@ static void test_a_corner_mirrors_the_kernel(void)
 {
     double squares = 0.0;
     for (int y = 0; y <= 4; y++) {
-        for (int x = 0; x <= 4; x++) {
-            squares += pow((gauss(x) + gauss(-1 - x)) * (gauss(y) + gauss(-1 - y)), 2.0);
-        }
+        for (int x = 0; x <= 4; x++) { squares += pow((gauss(x) + gauss(-1 - x)) * (gauss(y) + gauss(-1 - y)), 2.0); }
     }
     add(0, 0, 1);
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, squares / (W * H) - pow(1.0 / (W * H), 2.0), evl_sharpness_value(&s));
