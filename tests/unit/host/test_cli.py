@@ -99,7 +99,7 @@ def test_usage():
     expect("help", ["--help"], 0, ">replay", ">attitude", ">lut", ">info", ">sim", n_lines=0)
     expect("version", ["--version"], 0, r">^evstab \d+\.\d+\.\d+$", n_lines=0)
     expect("unknown command", ["frobnicate"], 2, "unknown command 'frobnicate'", n_lines=1)
-    for later in ("demo", "egomotion", "convert", "view", "live"):
+    for later in ("egomotion", "convert", "view", "live"):
         expect("a command that is not there yet", [later], 2, f"unknown command '{later}'", n_lines=1)
         check("help lists only what exists", f"  {later} " not in run("--help").stdout, later)
     for command in ("replay", "attitude", "lut", "info", "sim"):
@@ -109,15 +109,18 @@ def test_usage():
         if command != "replay":  # which takes several: tests/golden/batch.py
             expect(f"{command} a b", [command, "a", "b", "-o", "x"] if command != "info" else [command, "a", "b"], 2,
                    "one word too many: 'b'", n_lines=1)
-    for later in ("--image=iwe", "--warp=tiled", "--velocity=on", "--video=a.mp4", "--writ=events", "--i"):
+    for later in ("--image=iwe", "--warp=tiled", "--velocity=on", "--writ=events", "--i"):
         expect("an option of a later module", ["replay", "x", "-o", "y", later], 2, "unknown option", n_lines=1)
     for option, value in (("--window", "area:34x26"), ("--window", "count:0"), ("--window", "time:1.5"), ("--window", "roi:1"),
                           ("--window", "area:0x26:200"), ("--window", "area:34x26:99999"), ("--rotation", "both"),
                           ("--saccade", "1"), ("--attitude", "magic"), ("--imu-offset-us", "1ms"), ("--imu-offset-us", "99999999"),
                           ("--from", "now"), ("--to", ""), ("--size", "240"), ("--size", "240x0"), ("--size", "4096x4096"),
-                          ("--write", "frames"), ("--write", "events,frames"), ("--imu-order", "gyro")):
+                          ("--write", "frames"), ("--write", "events,frames"), ("--video", "a.avi"), ("--imu-order", "gyro")):
         folder = recording("usage")
         expect(f"{option} {value}", ["replay", folder, "-o", "out_usage", option, value], 2, option, n_lines=1)
+    expect("demo --help", ["demo", "--help"], 0, ">Usage: evstab demo", ">Exit status", n_lines=0)
+    for words in (["room"], ["--duration", "0"], ["--duration", "61"], ["--duration", "x"], ["--seed", "-1"], ["--what"]):
+        expect(f"demo {words}", ["demo", "-o", "out_usage", *words], 2, "evstab demo --help", n_lines=1)
     expect("value missing", ["replay", "x", "-o"], 2, "--output needs a value", n_lines=1)
     expect("given twice", ["replay", "x", "-o", "a", "-o", "b"], 2, "given twice", n_lines=1)
     expect("a flag with a value", ["replay", "x", "-o", "a", "--paper=yes"], 2, "--paper takes no value", n_lines=1)
