@@ -107,6 +107,69 @@ def check_page(page, temp, theme, flags, summary):
     check(f"{theme}: counts", f"{summary['saccades']} saccades" in dom and "skipped:" in dom, "saccades, skipped lines")
 
 
+# What a reader does, by script; what came of it is left in an element of its own.
+HANDS = """<p id="hands" hidden></p><script>
+window.setTimeout(() => {
+  const $ = (id) => document.getElementById(id);
+  const out = {};
+  const set = (id, value, event) => { $(id).value = value; $(id).dispatchEvent(new Event(event)); };
+  set("split", "20", "input");
+  out.split = $("compare").style.getPropertyValue("--split");
+  out.spoken = $("split").getAttribute("aria-valuetext");
+  out.moving = $("play").getAttribute("aria-label");
+  const pixels = () => $("pane-canvas").toDataURL().length + $("pane-canvas").toDataURL().slice(200, 3000);
+  set("seek", "3", "input");
+  const one = pixels();
+  set("exposure", $("exposure").options[0].value, "change");
+  set("seek", $("seek").max, "input");
+  out.moved = one !== pixels();
+  out.clock = $("clock").textContent;
+  const ground = () => getComputedStyle(document.body).backgroundColor;
+  const before = ground();
+  $("theme").click();
+  out.themed = before !== ground() && $("theme").textContent;
+  $("play").click();
+  out.playing = $("play").getAttribute("aria-label");
+  out.wide = document.documentElement.scrollWidth - window.innerWidth;
+  out.plain = [...document.querySelectorAll("canvas, svg")].filter((e) => !e.getAttribute("aria-label")).length;
+  $("hands").textContent = JSON.stringify(out);
+}, 3000);
+</script></body>"""
+
+
+def check_hands(page, temp):
+    handled = temp / "hands.html"
+    handled.write_text(page.read_text(encoding="utf-8").replace("</body>", HANDS), encoding="utf-8")
+    _, console, _, dom = browse(handled, temp, "--force-prefers-reduced-motion", "--window-size=500,900")
+    found = re.search(r'<p id="hands" hidden="">(.+?)</p>', dom, re.S)
+    hands = json.loads(html.unescape(found[1])) if found else {}
+    check("controls: no errors", bool(hands) and not console, (hands, console))
+    check("controls: slider", hands.get("split") == "20%" and "20 % raw" in hands.get("spoken", ""))
+    check("controls: nothing moves by itself for who wants it calm", hands.get("moving") == "Play")
+    check("controls: scrubber, exposure", hands.get("moved") is True and hands.get("clock") == f"{SECONDS:.2f} s")
+    check("controls: theme, play", hands.get("themed") == "Light theme" and hands.get("playing") == "Pause")
+    check("nothing is wider than a small window", hands.get("wide", 1) <= 0, hands.get("wide"))
+    check("every picture has a text", hands.get("plain") == 0, hands.get("plain"))
+
+
+def check_odd_recordings(program, folder, temp):
+    """Little to show must not break the page."""
+    single = temp / "single.txt"
+    single.write_text("5.0 10 20 1\n")
+    cases = {"no orientation": [folder, "--attitude", "none"],
+             "one event": [single, "--calib", folder / "calib.txt", "--attitude", "none"],
+             "events before the IMU": [folder, "--imu-offset-us", "1000000"]}
+    for case, words in cases.items():
+        out = temp / case
+        done = evstab(program, "replay", *words, "-o", out)
+        check(f"{case}: replay", done.returncode == 0, done.stderr)
+        status, console, _, dom = browse(out / "report.html", temp)
+        check(f"{case}: page", status is not None and status["ready"] and not status["errors"] and not console,
+              (status, console))
+        check(f"{case}: no NaN, no undefined", not re.search(r">[^<]*(NaN|undefined|Infinity)[^<]*<",
+                                                             dom[:dom.find('<script type="application/json"')]))
+
+
 def check_video(program, folder, temp):
     empty = temp / "empty"
     empty.mkdir()
@@ -179,6 +242,8 @@ def main():
             sys.exit(1 if FAULTS else 77)
         check_page(page, temp, "light", ["--blink-settings=preferredColorScheme=1"], summary)
         check_page(page, temp, "dark", ["--blink-settings=preferredColorScheme=0"], summary)
+        check_hands(page, temp)
+        check_odd_recordings(program, folder, temp)
     print(f"{len(FAULTS)} faults")
     sys.exit(1 if FAULTS else 0)
 
