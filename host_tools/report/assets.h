@@ -9,6 +9,12 @@
 
 extern const char evr_asset_report_html[];
 extern const char evr_asset_report_css[];
-extern const char evr_asset_report_js[];
+/* The script, in this order. */
+extern const char evr_asset_page_js[];
+extern const char evr_asset_before_after_js[];
+extern const char evr_asset_animation_js[];
+extern const char evr_asset_plots_js[];
+extern const char evr_asset_tables_js[];
+extern const char evr_asset_main_js[];
 
 #endif

@@ -242,6 +242,13 @@ static void put_data(evr_text_t *t, const evr_report_t *r, const char *name, con
     evr_put(t, "}");
 }
 
+static void put_script(evr_text_t *t)
+{
+    const char *const parts[] = {evr_asset_page_js,  evr_asset_before_after_js, evr_asset_animation_js,
+                                 evr_asset_plots_js, evr_asset_tables_js,       evr_asset_main_js};
+    for (size_t i = 0u; i < sizeof parts / sizeof parts[0]; i++) { evr_put(t, parts[i]); }
+}
+
 /* The template with its @WORDS@ replaced. */
 static void put_page(evr_text_t *t, const evr_report_t *r, const char *name, const char *summary)
 {
@@ -253,7 +260,7 @@ static void put_page(evr_text_t *t, const evr_report_t *r, const char *name, con
         if (strncmp(at + 1, "TITLE", length) == 0) { evr_put_html(t, name); }
         if (strncmp(at + 1, "STYLE", length) == 0) { evr_put(t, evr_asset_report_css); }
         if (strncmp(at + 1, "DATA", length) == 0) { put_data(t, r, name, summary); }
-        if (strncmp(at + 1, "SCRIPT", length) == 0) { evr_put(t, evr_asset_report_js); }
+        if (strncmp(at + 1, "SCRIPT", length) == 0) { put_script(t); }
         html = at + length + 2u;
     }
     evr_put(t, html);
