@@ -3,6 +3,7 @@
 #include "panes.h"
 
 #include <stdbool.h>
+#include <string.h>
 
 evr_panes_t evr_panes_layout(uint16_t width_px, uint16_t height_px)
 {
@@ -56,13 +57,24 @@ void evr_panes_add(const evr_panes_t *p, uint8_t *picture, const evs_event_t *ev
 
 static uint8_t sum_up_to(unsigned a, unsigned b, unsigned top) { return (uint8_t)((a + b < top) ? a + b : top); }
 
+static bool eight_are_empty(const uint8_t *cells)
+{
+    uint64_t word;
+    memcpy(&word, cells, sizeof word);
+    return word == 0u;
+}
+
 void evr_panes_merge(const evr_panes_t *p, uint8_t *into, const uint8_t *from)
 {
-    for (size_t i = 0u; i < p->n_cells; i++) {
-        if (from[i] != 0u) {
+    size_t i = 0u;
+    while (i < p->n_cells) {
+        if ((i + 8u <= p->n_cells) && eight_are_empty(from + i)) { /* Most are. */
+            i += 8u;
+        } else {
             const unsigned brighter = sum_up_to(into[i] & 0x0Fu, from[i] & 0x0Fu, 0x0Fu);
             const unsigned darker = sum_up_to(into[i] & 0xF0u, from[i] & 0xF0u, 0xF0u);
             into[i] = (uint8_t)(darker | brighter);
+            i++;
         }
     }
 }
