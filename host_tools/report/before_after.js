@@ -22,6 +22,7 @@ async function decode(base64) {
 
 function describeSpan(s) {
   const [raw, stabilized] = s.sharpness.map((v) => digits(v, 3));
+  const gained = s.sharpness[0] > 0 ? ` (${TIMES}${gain(s.sharpness).toFixed(2)})` : "";
   let what = "The span with most events";
   if (s.shaken) { what = "The span (of 30 ms at least) in which the camera turned fastest,"; }
   if (numbers.spans === 1) { what = "The whole recording"; }
@@ -32,7 +33,7 @@ function describeSpan(s) {
   $("after").setAttribute("aria-label", `The same events stabilized, sharpness ${stabilized}`);
   $("span-caption").textContent =
     `${what}: ${count(s.n_events)} events in ${seconds(s.to_s - s.from_s)}, from ${digits(s.from_s, 4)} s after the ` +
-    `first event. Sharpness ${raw} raw, ${stabilized} stabilized (${TIMES}${gain(s.sharpness).toFixed(2)}): variance ` +
+    `first event. Sharpness ${raw} raw, ${stabilized} stabilized${gained}: variance ` +
     "over the sensor of the picture of events, blurred by 1 px. Both pictures have one scale of ink.";
 }
 

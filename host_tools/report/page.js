@@ -45,6 +45,7 @@ function digits(x, n) { /* n significant digits, no exponent, a true minus sign,
   return (x < 0 ? MINUS : "") + grouped + (rest ? "." + rest : "");
 }
 const count = (n) => String(n).replace(/\B(?=(\d{3})+$)/g, THIN);
+const plural = (n, what) => count(n) + " " + what + (n === 1 ? "" : "s");
 function short(x) { /* 1.2 M */
   const a = Math.abs(x);
   if (a >= 1e9) { return digits(x / 1e9, 3) + THIN + "G"; }

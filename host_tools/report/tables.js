@@ -4,8 +4,7 @@
 function head() {
   const c = settings.camera;
   $("lead").textContent = [c.width_px + "\u00d7" + c.height_px + " px", seconds(data.duration_s),
-    count(summary.events.in) + " events", count(summary.windows) + " windows",
-    count(summary.saccades) + (summary.saccades === 1 ? " saccade" : " saccades")].join(" \u00b7 ");
+    plural(summary.events.in, "event"), plural(summary.windows, "window"), plural(summary.saccades, "saccade")].join(" \u00b7 ");
   if (summary.failure) {
     $("failure").textContent = "The run ended early: " + summary.failure;
     $("failure").hidden = false;

@@ -156,8 +156,11 @@ def check_odd_recordings(program, folder, temp):
     """Little to show must not break the page."""
     single = temp / "single.txt"
     single.write_text("5.0 10 20 1\n")
+    strong_lens = temp / "strong_lens.txt"  # The event's undistorted position is off the sensor.
+    strong_lens.write_text("200 200 119.5 89.5 -0.4 0.1 0 0 0\n")
     cases = {"no orientation": [folder, "--attitude", "none"],
              "one event": [single, "--calib", folder / "calib.txt", "--attitude", "none"],
+             "none on the sensor": [single, "--calib", strong_lens, "--attitude", "none"],
              "events before the IMU": [folder, "--imu-offset-us", "1000000"]}
     for case, words in cases.items():
         out = temp / case
