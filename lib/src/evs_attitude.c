@@ -257,13 +257,12 @@ static void learn_bias_at_rest(evs_attitude_t *att)
     const evs_vec3_t off_q24 = {att->gyro_lp_q24.x - (att->bias_q30.x >> 6),
                                 att->gyro_lp_q24.y - (att->bias_q30.y >> 6),
                                 att->gyro_lp_q24.z - (att->bias_q30.z >> 6)};
-    int32_t gain = BIAS_REST_Q31;
-    if (!has_flag(att, EVS_ATTITUDE_BIAS_KNOWN)) {
-        gain = INT32_MAX; /* the running mean as it is; refined from here */
-    } else if (largest(off_q24) > (uint32_t)att->bias_step_q31 >> 7) {
-        if (att->rest_us < RELEARN_US) { return; }
-        gain = INT32_MAX;
-    }
+    const bool known = has_flag(att, EVS_ATTITUDE_BIAS_KNOWN);
+    const uint32_t off = largest(off_q24);
+    if (known && (off > (uint32_t)att->bias_step_q31 >> 7) && (att->rest_us < RELEARN_US)) { return; }
+
+    /* The running mean as it is where it is news, refined where it is not. */
+    const int32_t gain = (known && (off <= (uint32_t)BIAS_STEP_Q31 >> 7)) ? BIAS_REST_Q31 : INT32_MAX;
     att->bias_q30.x += fraction(off_q24.x * 128, gain);
     att->bias_q30.y += fraction(off_q24.y * 128, gain);
     att->bias_q30.z += fraction(off_q24.z * 128, gain);

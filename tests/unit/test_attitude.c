@@ -239,6 +239,13 @@ static void test_given_orientation_that_is_wrong_is_corrected_in_time(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.1, 0.0, error_deg(quat(1.0, 0.0, 0.0, 0.0)));
 }
 
+static void test_given_orientation_that_is_upside_down_is_turned_over(void)
+{
+    TEST_ASSERT_EQUAL_INT(EVS_OK, evs_attitude_set_orientation(&att, quat_q30(quat(0.0, 1.0, 0.0, 0.0))));
+    rest_for(30.0, quat(1.0, 0.0, 0.0, 0.0), 0.0, false);
+    TEST_ASSERT_TRUE(tilt_error_deg(quat(1.0, 0.0, 0.0, 0.0)) < 0.5);
+}
+
 /* --- integration ----------------------------------------------------------------------------------------------- */
 
 static void test_gyro_alone_integrates_any_rate_to_the_true_angle(void)
@@ -280,6 +287,31 @@ static void test_delta_angles_and_rates_give_the_same_orientation(void)
     evs_attitude_push_delta_angle(&att, now_us + 1000u, vec(1.0, 0.0, 0.0, 30), 0u);
     TEST_ASSERT_EQUAL_UINT32(1u, evs_attitude_faults(&att).n_time_bad);
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.0, error_deg(truth));
+}
+
+static void test_jitter_of_time_stamps_does_not_stretch_delta_angles(void)
+{
+    evs_attitude_config_t cfg = evs_attitude_config_default();
+    cfg.mode = EVS_ATTITUDE_GYRO_ONLY;
+    start(&cfg);
+    for (int i = 1; i <= 1000; i++) {
+        const uint32_t jitter_us = (i % 2 == 0) ? 500u : 0u;
+        evs_attitude_push_delta_angle(&att, now_us + (uint32_t)(i * STEP_US) + jitter_us, vec(0.0, 0.0, 0.01, 30),
+                                      STEP_US);
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.0, error_deg(turn_d(0.0, 0.0, 10.0)));
+}
+
+static void test_lost_delta_angles_are_bridged_too(void)
+{
+    evs_attitude_config_t cfg = evs_attitude_config_default();
+    cfg.mode = EVS_ATTITUDE_GYRO_ONLY;
+    start(&cfg);
+    for (int i = 1; i <= 1000; i++) {
+        if ((i % 10 == 3) || (i % 10 == 4)) { continue; }
+        evs_attitude_push_delta_angle(&att, now_us + (uint32_t)(i * STEP_US), vec(0.0, 0.0, 0.01, 30), STEP_US);
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.0, error_deg(turn_d(0.0, 0.0, 10.0)));
 }
 
 static void test_lost_samples_are_bridged_by_the_mean_rate(void)
@@ -387,6 +419,53 @@ static void test_bias_can_be_saved_and_restored(void)
 
     evs_attitude_push_gyro(&att, now_us, vec(1.0, 0.0, 0.0, 24));
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.97, ldexp(evs_attitude_rate(&att).x, -24));
+}
+
+static void test_large_bias_tilts_less_and_less_even_if_the_carrier_never_rests(void)
+{
+    const double bias = 3.0 * DEG; /* held in a hand: tau times that is 9 deg */
+    quat_d truth = quat(1.0, 0.0, 0.0, 0.0);
+    double early = 0.0, late = 0.0;
+    for (int i = 0; i < 24000; i++) { /* 2 min of swaying about all axes */
+        const double t = i * STEP_US * 1e-6;
+        const double w[3] = {0.8 * sin(3.0 * t), 0.8 * cos(2.3 * t), 0.5 * sin(1.7 * t)};
+        truth = mul_d(truth, turn_d(w[0] * 0.005, w[1] * 0.005, w[2] * 0.005));
+        now_us += STEP_US;
+        evs_attitude_push_gyro(&att, now_us, vec(w[0] + bias, w[1], w[2], 24));
+        evs_attitude_push_accel(&att, now_us, seen(truth, 0.0, 0.0, G, 20));
+        if (i < 4000) { early = fmax(early, tilt_error_deg(truth)); }
+        if (i > 22000) { late = fmax(late, tilt_error_deg(truth)); }
+    }
+    TEST_ASSERT_FALSE(flag(EVS_ATTITUDE_BIAS_KNOWN));
+    TEST_ASSERT_TRUE(early > 6.0);
+    TEST_ASSERT_TRUE(late < early / 4.0);
+}
+
+static double bias_error(double x) { return fabs(ldexp(evs_attitude_bias(&att).x, -24) - x); }
+
+static void test_bias_given_may_be_a_little_off_and_is_refined_at_rest(void)
+{
+    TEST_ASSERT_EQUAL_INT(EVS_OK, evs_attitude_set_bias(&att, vec(0.0, 0.0, 0.0, 24)));
+    rest_for(30.0, quat(1.0, 0.0, 0.0, 0.0), 0.005, false);
+    TEST_ASSERT_TRUE(bias_error(0.005) < 1e-4);
+}
+
+static void test_bias_far_from_the_known_one_is_believed_after_a_minute_of_stillness(void)
+{
+    TEST_ASSERT_EQUAL_INT(EVS_OK, evs_attitude_set_bias(&att, vec(0.0, 0.0, 0.0, 24)));
+    rest_for(50.0, quat(1.0, 0.0, 0.0, 0.0), 0.03, false);
+    TEST_ASSERT_TRUE(bias_error(0.0) < 1e-6);
+    rest_for(20.0, quat(1.0, 0.0, 0.0, 0.0), 0.03, false);
+    TEST_ASSERT_TRUE(bias_error(0.03) < 1e-4);
+}
+
+static void test_bias_may_drift_while_nobody_can_see_it(void)
+{
+    quat_d truth = quat(1.0, 0.0, 0.0, 0.0);
+    rest_for(10.0, truth, 0.0, false);
+    for (int i = 0; i < 20000; i++) { truth = step(truth, 0.0, 0.0, (i % 400 < 200) ? 1.0 : -1.0, false); } /* 100 s */
+    rest_for(30.0, truth, 0.0045, false);
+    TEST_ASSERT_TRUE(bias_error(0.0045) < 1e-4);
 }
 
 /* --- bad data -------------------------------------------------------------------------------------------------- */
@@ -603,6 +682,36 @@ static void test_field_that_stays_changed_becomes_the_new_normal(void)
     TEST_ASSERT_TRUE(error_deg(truth) < 0.2);
 }
 
+/* Lying still in a field that points `east_ut` off north. */
+static void lie_beside_a_magnet(int seconds, double east_ut)
+{
+    for (int i = 0; i < seconds * 200; i++) {
+        now_us += STEP_US;
+        evs_attitude_push_gyro(&att, now_us, vec(0.0, 0.0, 0.0, 24));
+        evs_attitude_push_accel(&att, now_us, vec(0.0, 0.0, G, 20));
+        evs_attitude_push_mag(&att, now_us, vec(east_ut, FIELD_H, FIELD_V, 16));
+    }
+}
+
+static void test_disturbed_field_is_half_believed_after_a_minute_but_is_no_normal_at_rest(void)
+{
+    const quat_d north = quat(1.0, 0.0, 0.0, 0.0);
+    const double magnet_deg = atan2(20.0, FIELD_H) / DEG;
+    rest_for(70.0, north, 0.0, true);
+    lie_beside_a_magnet(55, 20.0);
+    TEST_ASSERT_TRUE(error_deg(north) < 1.0); /* what it took to notice */
+    lie_beside_a_magnet(35, 20.0);            /* 30 s of it with a time constant of 30 s */
+    TEST_ASSERT_DOUBLE_WITHIN(0.1 * magnet_deg, 0.63 * magnet_deg, error_deg(north));
+    TEST_ASSERT_TRUE(flag(EVS_ATTITUDE_MAG_DISTURBED));
+}
+
+static void test_wild_field_is_counted_once_the_usual_one_is_known(void)
+{
+    rest_for(10.0, quat(1.0, 0.0, 0.0, 0.0), 0.0, true);
+    evs_attitude_push_mag(&att, now_us + 1u, vec(0.0, 10.0 * FIELD_H, 10.0 * FIELD_V, 16));
+    TEST_ASSERT_EQUAL_UINT32(1u, evs_attitude_faults(&att).n_mag_bad);
+}
+
 /* --- rates and intervals --------------------------------------------------------------------------------------- */
 
 /* The carrier swings about all axes and surges; its motion is known in closed form. */
@@ -749,14 +858,21 @@ int main(void)
     RUN_TEST(test_declination_turns_magnetic_into_true_north);
     RUN_TEST(test_given_orientation_is_taken_as_it_is);
     RUN_TEST(test_given_orientation_that_is_wrong_is_corrected_in_time);
+    RUN_TEST(test_given_orientation_that_is_upside_down_is_turned_over);
     RUN_TEST(test_gyro_alone_integrates_any_rate_to_the_true_angle);
     RUN_TEST(test_delta_angles_and_rates_give_the_same_orientation);
+    RUN_TEST(test_jitter_of_time_stamps_does_not_stretch_delta_angles);
+    RUN_TEST(test_lost_delta_angles_are_bridged_too);
     RUN_TEST(test_lost_samples_are_bridged_by_the_mean_rate);
     RUN_TEST(test_gap_too_long_to_bridge_is_counted_and_recovered_from);
     RUN_TEST(test_time_that_runs_back_is_counted_and_a_restarted_clock_is_adopted);
     RUN_TEST(test_bias_is_learnt_at_rest);
     RUN_TEST(test_slow_turn_is_not_learnt_as_bias);
     RUN_TEST(test_bias_can_be_saved_and_restored);
+    RUN_TEST(test_large_bias_tilts_less_and_less_even_if_the_carrier_never_rests);
+    RUN_TEST(test_bias_given_may_be_a_little_off_and_is_refined_at_rest);
+    RUN_TEST(test_bias_far_from_the_known_one_is_believed_after_a_minute_of_stillness);
+    RUN_TEST(test_bias_may_drift_while_nobody_can_see_it);
     RUN_TEST(test_one_bad_sample_does_no_lasting_harm);
     RUN_TEST(test_bad_samples_are_counted_by_cause);
     RUN_TEST(test_lone_gyro_spike_is_taken_back_by_the_next_sample);
@@ -766,6 +882,8 @@ int main(void)
     RUN_TEST(test_clipped_gyro_is_recovered_from_with_the_limit_given_or_found);
     RUN_TEST(test_disturbed_field_is_flagged_and_not_followed);
     RUN_TEST(test_field_that_stays_changed_becomes_the_new_normal);
+    RUN_TEST(test_disturbed_field_is_half_believed_after_a_minute_but_is_no_normal_at_rest);
+    RUN_TEST(test_wild_field_is_counted_once_the_usual_one_is_known);
     RUN_TEST(test_rates_may_differ_between_sensors_and_change_within_one);
     RUN_TEST(test_valenti_mode_converges_from_any_start_with_its_time_constant);
     RUN_TEST(test_valenti_mode_learns_bias_in_steady_state);
