@@ -392,7 +392,7 @@ static void test_bias_is_learnt_at_rest(void)
 
 static void test_slow_turn_is_not_learnt_as_bias(void)
 {
-    static const double RATES_DEG[] = {0.5, 1.0, 2.0, 5.0, 25.0};
+    static const double RATES_DEG[] = {0.5, 2.0, 25.0};
     for (size_t r = 0; r < sizeof RATES_DEG / sizeof RATES_DEG[0]; r++) {
         start(NULL);
         quat_d truth = quat(1.0, 0.0, 0.0, 0.0);
@@ -426,7 +426,7 @@ static void test_large_bias_tilts_less_and_less_even_if_the_carrier_never_rests(
     const double bias = 3.0 * DEG; /* held in a hand: tau times that is 9 deg */
     quat_d truth = quat(1.0, 0.0, 0.0, 0.0);
     double early = 0.0, late = 0.0;
-    for (int i = 0; i < 24000; i++) { /* 2 min of swaying about all axes */
+    for (int i = 0; i < 16000; i++) { /* 80 s of swaying about all axes */
         const double t = i * STEP_US * 1e-6;
         const double w[3] = {0.8 * sin(3.0 * t), 0.8 * cos(2.3 * t), 0.5 * sin(1.7 * t)};
         truth = mul_d(truth, turn_d(w[0] * 0.005, w[1] * 0.005, w[2] * 0.005));
@@ -434,11 +434,11 @@ static void test_large_bias_tilts_less_and_less_even_if_the_carrier_never_rests(
         evs_attitude_push_gyro(&att, now_us, vec(w[0] + bias, w[1], w[2], 24));
         evs_attitude_push_accel(&att, now_us, seen(truth, 0.0, 0.0, G, 20));
         if (i < 4000) { early = fmax(early, tilt_error_deg(truth)); }
-        if (i > 22000) { late = fmax(late, tilt_error_deg(truth)); }
+        if (i > 14000) { late = fmax(late, tilt_error_deg(truth)); }
     }
     TEST_ASSERT_FALSE(flag(EVS_ATTITUDE_BIAS_KNOWN));
     TEST_ASSERT_TRUE(early > 6.0);
-    TEST_ASSERT_TRUE(late < early / 4.0);
+    TEST_ASSERT_TRUE(late < early / 3.0);
 }
 
 static double bias_error(double x) { return fabs(ldexp(evs_attitude_bias(&att).x, -24) - x); }
@@ -754,7 +754,7 @@ static void test_rates_may_differ_between_sensors_and_change_within_one(void)
         const uint32_t t0_us = now_us;
         TEST_ASSERT_EQUAL_INT(EVS_OK, evs_attitude_set_orientation(&att, quat_q30(flight(0.0, w))));
         evs_attitude_push_gyro(&att, now_us, vec(0.0, 0.0, 0.0, 24));
-        for (int i = 0; t < ((CASES[c][0] == 100) ? 5.0 : 20.0); i++) {
+        for (int i = 0; t < ((CASES[c][0] == 100) ? 3.0 : 12.0); i++) {
             random = random * 1664525u + 1013904223u;
             const uint32_t dt_us = (CASES[c][0] != 0) ? (uint32_t)CASES[c][0] : 100u + (random >> 16) % 19901u;
             const double t_before = t;
