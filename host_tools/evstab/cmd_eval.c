@@ -8,6 +8,7 @@
 #include "command.h"
 #include "decimal.h"
 #include "eval.h"
+#include "evaluation.h"
 #include "json.h"
 #include "lines.h"
 #include "options.h"
@@ -49,7 +50,8 @@ static const evt_usage_t USAGE = {
     .command = "eval",
     .synopsis = "RUN --truth FILE [options]",
     .about =
-        "Compares a run (the output folder of evstab replay) with the truth, prints a table and writes eval.json.\n"
+        "Compares a run (the output folder of evstab replay) with the truth, prints a table, writes eval.json\n"
+        "and adds a section to the run's report.html, if it has one.\n"
         "  attitude   q_est q_ref^-1 in the earth's frame: total, inclination, heading; and the error of the rotation\n"
         "             over 0.1 s and 1 s, which is what stabilization feels. Truth is interpolated in gaps <= 0.1 s.\n"
         "             A heading or world is aligned over one second: the last before the truth starts to turn, if it\n"
@@ -322,6 +324,25 @@ static bool eval_all(const evt_eval_t *e, const run_t *run, evt_eval_result_t *x
     return ok;
 }
 
+/* What stands in the file goes into the report too, without the single pictures: the page has its own plot of them. */
+static bool put_into_report(const char *dir, const char *path, bool *found, evh_error_t *err)
+{
+    cJSON *const root = evt_json_read(path, err);
+    char *text;
+    bool ok;
+    if (root == NULL) { return false; }
+    const cJSON *const sharpness = cJSON_GetObjectItem(root, "sharpness");
+    for (cJSON *kind = (sharpness != NULL) ? sharpness->child : NULL; kind != NULL; kind = kind->next) {
+        cJSON_DeleteItemFromObject(kind, "pictures");
+    }
+    text = cJSON_PrintUnformatted(root);
+    cJSON_Delete(root);
+    if (text == NULL) { return evh_fail(err, "out of memory"); }
+    ok = evr_put_evaluation(dir, text, found, err);
+    cJSON_free(text);
+    return ok;
+}
+
 int evt_eval_main(int argc, char **argv)
 {
     static evt_eval_result_t x;
@@ -337,10 +358,11 @@ int evt_eval_main(int argc, char **argv)
     ok = run_open(&run, e.run, &x, &err) && eval_all(&e, &run, &x, &err);
     if (ok) {
         const char *const path = (opt_json != NULL) ? opt_json : run.json;
-        ok = evt_eval_write_json(&e, &x, path, &err);
+        bool in_report = false;
+        ok = evt_eval_write_json(&e, &x, path, &err) && put_into_report(e.run, path, &in_report, &err);
         if (ok && !evh_is_quiet()) {
             evt_eval_print(&e, &x, stdout);
-            (void)printf("wrote %s\n", path);
+            (void)printf("wrote %s%s\n", path, in_report ? ", and a section of report.html" : "");
         }
     }
     evl_run_sharpness_free(&x.sharpness);

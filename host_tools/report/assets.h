@@ -15,6 +15,7 @@ extern const char evr_asset_before_after_js[];
 extern const char evr_asset_animation_js[];
 extern const char evr_asset_plots_js[];
 extern const char evr_asset_tables_js[];
+extern const char evr_asset_evaluation_js[];
 extern const char evr_asset_main_js[];
 
 #endif

@@ -4,6 +4,7 @@
 head();
 cards();
 plots();
+evaluation();
 eventTable();
 settingsTable();
 Promise.all([beforeAndAfter(), animation()]).then(() => {

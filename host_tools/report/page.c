@@ -245,7 +245,8 @@ static void put_data(evr_text_t *t, const evr_report_t *r, const char *name, con
 static void put_script(evr_text_t *t)
 {
     const char *const parts[] = {evr_asset_page_js,  evr_asset_before_after_js, evr_asset_animation_js,
-                                 evr_asset_plots_js, evr_asset_tables_js,       evr_asset_main_js};
+                                 evr_asset_plots_js, evr_asset_tables_js,       evr_asset_evaluation_js,
+                                 evr_asset_main_js};
     for (size_t i = 0u; i < sizeof parts / sizeof parts[0]; i++) { evr_put(t, parts[i]); }
 }
 

@@ -99,6 +99,7 @@ def check_page(page, temp, theme, flags, summary):
         curves = 3 if plot in ("attitude", "rate") else 1
         n = status["plots"].get(plot, 0)
         check(f"{theme}: plot {plot}", 2 * curves < n <= 2000 * curves, f"{n} points")
+    check(f"{theme}: evaluation", status["evaluation"] == 25, f"{status['evaluation']} cells")
     check(f"{theme}: animation", status["pictures"] >= 50, f"{status['pictures']} pictures")
     check(f"{theme}: before and after", status["span"]["before"] > 300 and 100 < status["span"]["after"],
           status["span"])
@@ -150,6 +151,33 @@ def check_hands(page, temp):
     check("controls: theme, play", hands.get("themed") == "Light theme" and hands.get("playing") == "Pause")
     check("nothing is wider than a small window", hands.get("wide", 1) <= 0, hands.get("wide"))
     check("every picture has a text", hands.get("plain") == 0, hands.get("plain"))
+
+
+def check_evaluation(program, out, temp):
+    """evstab eval adds a section; a second run replaces it."""
+    truth = temp / "truth.txt"
+    with open(truth, "w", encoding="ascii") as f:
+        for i in range(int(SECONDS * 200) + 1):
+            half = yaw(i / 200) / 2
+            f.write(f"{1 + i / 200:.6f} 0 0 0 0 {math.sin(half):.9f} 0 {math.cos(half):.9f}\n")
+    page = out / "report.html"
+    before = len(page.read_bytes())
+    sizes = []
+    for _ in range(2):
+        done = evstab(program, "eval", out, "--truth", truth, "--align", "world")
+        check("eval", done.returncode == 0 and "a section of report.html" in done.stdout, done.stdout + done.stderr)
+        sizes.append(len(page.read_bytes()))
+    check("the section replaces itself", sizes[0] == sizes[1] > before, sizes)
+    text = page.read_text(encoding="utf-8")
+    shown = json.loads(re.search(r'<script type="application/json" id="evaluation-data">(.*?)</script>', text, re.S)[1])
+    found = json.loads((out / "eval.json").read_text())
+    check("the section holds what eval.json holds", shown["attitude"] == found["attitude"], shown["attitude"])
+    check("attitude against the truth", found["attitude"]["total"]["rmse_deg"] < 1.0, found["attitude"]["total"])
+    page.write_text("<!DOCTYPE html><p>another page", encoding="utf-8")
+    done = evstab(program, "eval", out, "--truth", truth)
+    check("a page that is none of ours is left alone",
+          done.returncode == 1 and "report.html" in done.stderr and "another" in page.read_text(), done.stderr)
+    page.write_text(text, encoding="utf-8")
 
 
 def check_odd_recordings(program, folder, temp):
@@ -238,6 +266,7 @@ def main():
         check("attitude", abs(turn - math.degrees(yaw(SECONDS))) < 2.0, f"yaw {turn} deg at the end")
         done = evstab(program, "replay", folder, "-o", temp / "bare", "--no-report")
         check("--no-report", done.returncode == 0 and not (temp / "bare" / "report.html").exists())
+        check_evaluation(program, out, temp)
         check_video(program, folder, temp)
         check_demo(program, temp)
         if shutil.which("chromium") is None:
