@@ -196,11 +196,14 @@ static void follow_attitude(evs_pipeline_t *p, uint32_t t_us, evs_quat_t attitud
     }
     const evs_quat_t carried =
         evs_quat_mul(p->view_q_wc, evs_quat_from_rotvec(evs_rotvec_of_rate(rate_rad_s_q24, dt_us)));
-    const evs_vec3_t apart = evs_quat_to_rotvec(evs_quat_mul(attitude_wc, evs_quat_conj(carried)));
+    /* Half of what is between them is the vector part of the quotient, as long as it is small; and if not, it shrinks. */
+    const evs_quat_t apart = evs_quat_mul(attitude_wc, evs_quat_conj(carried));
     const uint64_t part_q30 = ((uint64_t)(uint32_t)dt_us * p->view_per_us_q50) >> 20;
     const int32_t step_q30 = (part_q30 < (uint32_t)EVS_ONE_Q30) ? (int32_t)part_q30 : EVS_ONE_Q30;
-    const evs_quat_t moved = evs_quat_mul(evs_quat_from_rotvec(evs_vec3_scale(apart, step_q30, 30)), carried);
-    if (evs_quat_normalize(moved, &p->view_q_wc) != EVS_OK) { p->view_q_wc = attitude_wc; }
+    const int32_t towards_q30 = (apart.w < 0) ? -step_q30 : step_q30; /* the shorter way round */
+    const evs_quat_t step = {EVS_ONE_Q30, evs_q_mul(apart.x, towards_q30, 30), evs_q_mul(apart.y, towards_q30, 30),
+                             evs_q_mul(apart.z, towards_q30, 30)};
+    if (evs_quat_normalize(evs_quat_mul(step, carried), &p->view_q_wc) != EVS_OK) { p->view_q_wc = attitude_wc; }
 }
 
 void evs_pipeline_push_gyro(evs_pipeline_t *p, uint32_t t_us, evs_vec3_t rate_rad_s_q24)
@@ -321,28 +324,39 @@ static bool orientation_arrived(const evs_pipeline_t *p, uint32_t t_us)
            (evs_time_diff_us(newest_us, t_us + half_us) >= 0);
 }
 
-/* Begin a slice with the event at t_us, which belongs to the open window. */
+/* The first event of the open window that has an orientation: does the window begin with a saccade? */
+static bool begin_window(evs_pipeline_t *p, uint32_t t_us)
+{
+    evs_orientation_t at;
+    if (evs_orientation_track_at(&p->track, t_us, &at) != EVS_OK) { return false; }
+    p->window_saccade = evs_stabilize_begin_window(&p->stabilize, at.q_wc);
+    p->window_q_rc = evs_stabilize_rotation(&p->stabilize);
+    p->window_oriented = true;
+    p->slice_rate_rad_s_q24 = at.rate_rad_s_q24;
+    return true;
+}
+
+/*
+ * Begin a slice with the event at t_us, which belongs to the open window. How long it may be is told by the rate in the
+ * middle of the slice before, at most a slice ago: a query that costs nothing.
+ */
 static void start_slice(evs_pipeline_t *p, uint32_t t_us)
 {
     p->slice_first_us = t_us;
     p->slice_us = p->cfg.stabilize.slice_max_us;
-    evs_orientation_t at;
-    p->slice_oriented = evs_orientation_track_at(&p->track, t_us, &at) == EVS_OK;
+    p->slice_oriented = p->window_oriented || begin_window(p, t_us);
     if (!p->slice_oriented) { return; }
-
-    if (!p->window_oriented) {
-        p->window_saccade = evs_stabilize_begin_window(&p->stabilize, at.q_wc);
-        p->window_q_rc = evs_stabilize_rotation(&p->stabilize);
-        p->window_oriented = true;
-    }
     if (p->cfg.stabilize.rotation == EVS_ROTATION_WINDOW) {
         p->slice_us = UINT32_MAX; /* until the window closes */
         return;
     }
-    p->slice_us = evs_stabilize_slice_us(&p->stabilize, at.rate_rad_s_q24);
-    evs_orientation_t middle;
-    const bool known = evs_orientation_track_at(&p->track, t_us + p->slice_us / 2u, &middle) == EVS_OK;
-    evs_stabilize_set_orientation(&p->stabilize, known ? middle.q_wc : at.q_wc);
+    p->slice_us = evs_stabilize_slice_us(&p->stabilize, p->slice_rate_rad_s_q24);
+    evs_orientation_t at;
+    p->slice_oriented = (evs_orientation_track_at(&p->track, t_us + p->slice_us / 2u, &at) == EVS_OK) ||
+                        (evs_orientation_track_at(&p->track, t_us, &at) == EVS_OK);
+    if (!p->slice_oriented) { return; }
+    p->slice_rate_rad_s_q24 = at.rate_rad_s_q24;
+    evs_stabilize_set_orientation(&p->stabilize, at.q_wc);
 }
 
 static void forget_window(evs_pipeline_t *p)

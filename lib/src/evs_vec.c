@@ -106,16 +106,23 @@ evs_vec3_t evs_quat_to_rotvec(evs_quat_t q)
     const evs_vec3_t u = {q.x, q.y, q.z};
     const uint64_t sin_sq_q60 = evs_vec3_norm_sq(u);
 
-    /* sin(a/2) below 2^-10: a = 2 sin(a/2) (1 + sin^2 / 6), and the quotient below would lose its bits. */
-    if (sin_sq_q60 < (UINT64_C(1) << 40)) {
-        const evs_vec3_t r = {evs_shr_r(u.x, 1), evs_shr_r(u.y, 1), evs_shr_r(u.z, 1)};
-        return r;
+    /*
+     * sin(a/2) below 1/8, which is a turn below 14 degrees: between two samples of a gyro it always is. The factor
+     * 2 asin(s) / s by its series in s^2 to s^6; the next term is below 2 * 10^-9.
+     */
+    if (sin_sq_q60 < (UINT64_C(1) << 54)) {
+        const int32_t ss_q30 = (int32_t)(sin_sq_q60 >> 30);
+        int32_t f_q28 = 23967451;                         /* 2 * 5/112 */
+        f_q28 = 40265318 + evs_q_mul(f_q28, ss_q30, 30);  /* 2 * 3/40 */
+        f_q28 = 89478485 + evs_q_mul(f_q28, ss_q30, 30);  /* 2 * 1/6 */
+        f_q28 = 536870912 + evs_q_mul(f_q28, ss_q30, 30); /* 2 */
+        return evs_vec3_scale(u, f_q28, 30);
     }
     const int32_t sin_q30 = (int32_t)evs_sqrt_u64(sin_sq_q60);
     const int32_t half_angle_q28 = evs_rad_from_angle(evs_atan2(sin_q30, q.w)); /* in [0, pi/2] */
     unsigned shift;
     const uint32_t r = evs_recip_u32((uint32_t)sin_q30, &shift);
-    /* 2 * half / sin in Q28: in [2, pi]. shift is in [51, 62]. */
+    /* 2 * half / sin in Q28: in [2, pi]. shift is in [58, 62]. */
     const int32_t factor_q28 = (int32_t)evs_shr_r64((int64_t)half_angle_q28 * (int64_t)(r >> 1), shift - 32u);
     return evs_vec3_scale(u, factor_q28, 30);
 }

@@ -16,7 +16,8 @@ enum {
     BENCH_LOOKUP_GRID_TILES = 3,
     BENCH_WINDOW = 4,
     BENCH_ROTATE = 5,
-    BENCH_SLICE = 6
+    BENCH_SLICE = 6,
+    BENCH_PIPELINE = 7
 };
 
 /* bench_attitude.c */

@@ -36,6 +36,7 @@ PER_EVENT = [  # (row, regions that it adds up)
     ("rotation", ["ROTATE"]),
     ("**all: full table + window + rotation**", ["LOOKUP_FULL_TILES", "WINDOW", "ROTATE"]),
     ("**all: grid + window + rotation**", ["LOOKUP_GRID_TILES", "WINDOW", "ROTATE"]),
+    ("pipeline with a full table: all of that, FIFO, chunks, and a slice and an IMU sample (6D) a ms", ["PIPELINE"]),
 ]
 PER_CALL = [("new orientation, once per slice of at most 1 ms", "SLICE")]
 PER_UPDATE = [

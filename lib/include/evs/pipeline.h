@@ -122,6 +122,7 @@ typedef struct { /** Context. A complete type only so that you can place it: eve
 
     uint32_t slice_first_us;
     uint32_t slice_us; /* 0: no slice yet */
+    evs_vec3_t slice_rate_rad_s_q24;
     bool slice_oriented;
     bool window_oriented; /* the open window has been given to stabilize */
     bool window_saccade;
