@@ -83,12 +83,13 @@ install_missing() {
 
 # The Python packages that tests compare against, in a place of their own.
 make_venv() {
-    wanted=$(cksum tests/requirements.txt)
+    wanted=$(cat tests/requirements.txt tests/requirements-batch.txt | cksum)
     if [ -x "$venv/bin/python" ] && [ "$(cat "$venv/installed" 2>/dev/null)" = "$wanted" ]; then return; fi
     say "Python packages into build/venv"
     rm -rf "$venv"
     python3 -m venv "$venv"
-    "$venv/bin/python" -m pip install --quiet --disable-pip-version-check -r tests/requirements.txt
+    "$venv/bin/python" -m pip install --quiet --disable-pip-version-check \
+        -r tests/requirements.txt -r tests/requirements-batch.txt
     echo "$wanted" >"$venv/installed"
 }
 
