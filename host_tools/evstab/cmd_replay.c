@@ -131,9 +131,10 @@ static void print_result(const evt_replay_t *r, const evt_replay_options_t *o, c
     char duration[32];
     if (evh_is_quiet()) { return; }
     duration[evh_decimal_format(duration, x->t_last_us - x->t_first_us, 6u)] = '\0';
-    (void)printf("%s: %" PRIu64 " events in %s s, %" PRIu64 " windows, %" PRIu64
-                 " saccades; %.1f ns per event in the library, %.1f in all\n",
-                 evh_path_name(r->rec.events), x->n_events, duration, x->n_windows, x->n_saccades,
+    (void)printf("%s: %" PRIu64 " event%s in %s s, %" PRIu64 " window%s, %" PRIu64
+                 " saccade%s; %.1f ns per event in the library, %.1f in all\n",
+                 evh_path_name(r->rec.events), x->n_events, (x->n_events == 1u) ? "" : "s", duration, x->n_windows,
+                 (x->n_windows == 1u) ? "" : "s", x->n_saccades, (x->n_saccades == 1u) ? "" : "s",
                  (double)x->library_ns / (double)x->n_events, (double)x->wall_ns / (double)x->n_events);
     if (n->sharpness_before > 0.0) {
         (void)printf("sharpness %.3g raw, %.3g stabilized: x%.2f\n", n->sharpness_before, n->sharpness_after,

@@ -18,11 +18,30 @@
 #define TRUTH_PERIOD_NS INT64_C(5000000)
 #define EVENT_BYTES_MAX 64u
 
-static void remove_old(const char *dir, const char *name)
+static bool remove_old(const char *dir, const char *name)
 {
     char *const path = evh_path_join(dir, name);
-    if (path != NULL) { (void)unlink(path); }
+    const bool removed = (path != NULL) && (unlink(path) == 0);
     free(path);
+    return removed;
+}
+
+#define FRAME_NAME_MAX 64u
+
+static void frame_name(char name[FRAME_NAME_MAX], uint64_t n)
+{
+    (void)snprintf(name, FRAME_NAME_MAX, "images/frame_%08" PRIu64 ".png", n);
+}
+
+/* Frames of an earlier, longer flight would outlive this one. */
+static void remove_old_frames(const char *dir)
+{
+    char name[FRAME_NAME_MAX];
+    uint64_t n = 0u;
+    do {
+        frame_name(name, n);
+        n++;
+    } while (remove_old(dir, name));
 }
 
 bool evsim_output_open(evsim_output_t *out, const char *dir, const evsim_settings_t *settings, evh_error_t *err)
@@ -31,8 +50,9 @@ bool evsim_output_open(evsim_output_t *out, const char *dir, const evsim_setting
     out->dir = dir;
     out->frames = settings->frames;
     if (!evh_make_folder(dir, err)) { return false; }
-    remove_old(dir, settings->gz ? "events.txt" : "events.txt.gz"); /* A reader must not find two recordings. */
-    remove_old(dir, "images.txt");
+    (void)remove_old(dir, settings->gz ? "events.txt" : "events.txt.gz"); /* A reader must not find two recordings. */
+    (void)remove_old(dir, "images.txt");
+    remove_old_frames(dir);
     if (!evsim_text_open(&out->events, dir, settings->gz ? "events.txt.gz" : "events.txt", settings->gz, err)) {
         return false;
     }
@@ -130,11 +150,11 @@ void evsim_output_events(evsim_output_t *out, const evsim_event_t *event, size_t
 bool evsim_output_frame(evsim_output_t *out, int64_t t_ns, const uint8_t *gray, unsigned width_px, unsigned height_px,
                         evh_error_t *err)
 {
-    char name[64];
+    char name[FRAME_NAME_MAX];
     char *path;
     char *p;
     bool ok;
-    (void)snprintf(name, sizeof name, "images/frame_%08" PRIu64 ".png", out->n_frames);
+    frame_name(name, out->n_frames);
     path = evh_path_join(out->dir, name);
     if (path == NULL) { return evh_fail(err, "out of memory"); }
     ok = evsim_image_write_png(path, gray, width_px, height_px, err);

@@ -120,6 +120,13 @@ class Runs(unittest.TestCase):
         self.assertEqual(before, gzip.decompress((plain / "events.txt.gz").read_bytes()))
         self.assertFalse((plain / "events.txt").exists())
 
+    def test_a_shorter_flight_leaves_no_frame_of_a_longer_one(self):
+        out = self.run_sim("shapes", *SMALL)
+        longer = len(list((out / "images").iterdir()))
+        self.run_sim("shapes", "--size", "64x48", "--duration", "0.1", "-o", str(out))
+        self.assertLess(len(list((out / "images").iterdir())), longer)
+        self.assertEqual(len((out / "images.txt").read_text().splitlines()), len(list((out / "images").iterdir())))
+
     # Determinism.
 
     def test_same_settings_same_bytes_with_any_number_of_threads(self):
