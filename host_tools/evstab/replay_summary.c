@@ -9,30 +9,8 @@
 #include "decimal.h"
 #include "evs/float.h"
 #include "evs/version.h"
+#include "json.h"
 #include "replay.h"
-
-static void add_text(cJSON *to, const char *key, const char *text)
-{
-    if (text != NULL) {
-        (void)cJSON_AddStringToObject(to, key, text);
-    } else {
-        (void)cJSON_AddNullToObject(to, key);
-    }
-}
-
-static void add_count(cJSON *to, const char *key, uint64_t value)
-{
-    char text[24];
-    (void)snprintf(text, sizeof text, "%" PRIu64, value);
-    (void)cJSON_AddRawToObject(to, key, text); /* As digits: a double would round large counts. */
-}
-
-static void add_seconds(cJSON *to, const char *key, int64_t t_us)
-{
-    char text[32];
-    text[evh_decimal_format(text, t_us, 6u)] = '\0';
-    (void)cJSON_AddRawToObject(to, key, text);
-}
 
 /* A measured number: a few digits that mean something. */
 static void add_measure(cJSON *to, const char *key, double value)
@@ -46,7 +24,7 @@ static void add_faults(cJSON *to, const char *key, const evh_tally_t *tally)
 {
     cJSON *const faults = cJSON_AddObjectToObject(to, key);
     for (int i = EVH_FAULT_NONE + 1; i < EVH_FAULT_COUNT; i++) {
-        add_count(faults, evh_fault_key((evh_fault_t)i), tally->n_fault[i]);
+        evt_json_count(faults, evh_fault_key((evh_fault_t)i), tally->n_fault[i]);
     }
 }
 
@@ -56,7 +34,7 @@ static void add_camera(cJSON *to, const evh_calib_t *c)
     cJSON *dist;
     (void)cJSON_AddNumberToObject(camera, "width_px", c->width_px);
     (void)cJSON_AddNumberToObject(camera, "height_px", c->height_px);
-    add_text(camera, "model", c->fisheye ? "fisheye" : "pinhole");
+    evt_json_text(camera, "model", c->fisheye ? "fisheye" : "pinhole");
     (void)cJSON_AddNumberToObject(camera, "fx_px", c->fx_px);
     (void)cJSON_AddNumberToObject(camera, "fy_px", c->fy_px);
     (void)cJSON_AddNumberToObject(camera, "cx_px", c->cx_px);
@@ -80,7 +58,7 @@ static void add_window(cJSON *to, const evs_pipeline_config_t *p)
         (void)snprintf(text, sizeof text, "time:%" PRIu32, p->window.duration_us);
         break;
     }
-    add_text(to, "window", text);
+    evt_json_text(to, "window", text);
 }
 
 static void add_settings(cJSON *root, const evt_replay_t *r, const evt_replay_options_t *o)
@@ -89,14 +67,14 @@ static void add_settings(cJSON *root, const evt_replay_t *r, const evt_replay_op
     const int32_t q[4] = {p->q_ci.w, p->q_ci.x, p->q_ci.y, p->q_ci.z};
     cJSON *const s = cJSON_AddObjectToObject(root, "settings");
     cJSON *q_ci;
-    add_text(s, "events", r->rec.events);
-    add_text(s, "imu", r->rec.imu);
-    add_text(s, "poses", r->rec.poses);
-    add_text(s, "calib", r->calib_path);
-    add_text(s, "config", (o->config != NULL) ? o->config : r->rec.config);
-    add_text(s, "attitude", evt_attitude_name(r->attitude));
+    evt_json_text(s, "events", r->rec.events);
+    evt_json_text(s, "imu", r->rec.imu);
+    evt_json_text(s, "poses", r->rec.poses);
+    evt_json_text(s, "calib", r->calib_path);
+    evt_json_text(s, "config", (o->config != NULL) ? o->config : r->rec.config);
+    evt_json_text(s, "attitude", evt_attitude_name(r->attitude));
     add_window(s, p);
-    add_text(s, "rotation", (p->stabilize.rotation == EVS_ROTATION_WINDOW) ? "window" : "slice");
+    evt_json_text(s, "rotation", (p->stabilize.rotation == EVS_ROTATION_WINDOW) ? "window" : "slice");
     (void)cJSON_AddNumberToObject(s, "slice_max_us", p->stabilize.slice_max_us);
     (void)cJSON_AddNumberToObject(s, "saccade_px", p->stabilize.saccade_px_q4 / 16.0);
     (void)cJSON_AddBoolToObject(s, "paper", o->paper);
@@ -104,8 +82,8 @@ static void add_settings(cJSON *root, const evt_replay_t *r, const evt_replay_op
     (void)cJSON_AddNumberToObject(s, "table_step_px", p->table_step_px);
     q_ci = cJSON_AddArrayToObject(s, "q_camera_from_imu_wxyz");
     for (int i = 0; i < 4; i++) { (void)cJSON_AddItemToArray(q_ci, cJSON_CreateNumber(evs_q_to_double(q[i], 30u))); }
-    if (r->from_us != INT64_MIN) { add_seconds(s, "from_s", r->from_us); }
-    if (r->to_us != INT64_MAX) { add_seconds(s, "to_s", r->to_us); }
+    if (r->from_us != INT64_MIN) { evt_json_seconds(s, "from_s", r->from_us); }
+    if (r->to_us != INT64_MAX) { evt_json_seconds(s, "to_s", r->to_us); }
     add_camera(s, &r->calib);
 }
 
@@ -113,36 +91,36 @@ static void add_events(cJSON *root, const evt_replay_result_t *x)
 {
     cJSON *const e = cJSON_AddObjectToObject(root, "events");
     cJSON *outside;
-    add_count(e, "in", x->events_tally.n_good + evh_tally_skipped(&x->events_tally));
-    add_count(e, "before_from", x->n_before_from);
-    add_count(e, "after_to", x->n_after_to);
-    add_count(e, "replayed", x->n_events);
-    add_count(e, "kept", x->n_kept);
+    evt_json_count(e, "in", x->events_tally.n_good + evh_tally_skipped(&x->events_tally));
+    evt_json_count(e, "before_from", x->n_before_from);
+    evt_json_count(e, "after_to", x->n_after_to);
+    evt_json_count(e, "replayed", x->n_events);
+    evt_json_count(e, "kept", x->n_kept);
     outside = cJSON_AddObjectToObject(e, "outside");
-    add_count(outside, "no_undistorted_position", x->n_no_undistorted);
-    add_count(outside, "no_orientation", x->n_unoriented);
-    add_count(outside, "rotated_out_of_range", x->n_out_of_range);
+    evt_json_count(outside, "no_undistorted_position", x->n_no_undistorted);
+    evt_json_count(outside, "no_orientation", x->n_unoriented);
+    evt_json_count(outside, "rotated_out_of_range", x->n_out_of_range);
     add_faults(e, "bad", &x->events_tally);
-    add_count(e, "time_back_in_library", x->counts.n_time_back); /* After a pause of more than 35 min, say. */
-    add_count(e, "clock_restarts", x->counts.n_restarts);
+    evt_json_count(e, "time_back_in_library", x->counts.n_time_back); /* After a pause of more than 35 min, say. */
+    evt_json_count(e, "clock_restarts", x->counts.n_restarts);
 }
 
 static void add_attitude(cJSON *root, const evt_replay_t *r, const evt_replay_result_t *x)
 {
     cJSON *const a = cJSON_AddObjectToObject(root, "attitude");
     const evs_attitude_faults_t *const f = &x->attitude_faults;
-    add_count(a, "samples", x->n_orientations);
+    evt_json_count(a, "samples", x->n_orientations);
     if (x->n_orientations > 0u) {
-        add_seconds(a, "t_first_s", x->orientation_first_us);
-        add_seconds(a, "t_last_s", x->orientation_last_us);
+        evt_json_seconds(a, "t_first_s", x->orientation_first_us);
+        evt_json_seconds(a, "t_last_s", x->orientation_last_us);
     }
     if ((r->attitude == EVT_ATTITUDE_IMU) || (r->attitude == EVT_ATTITUDE_GYRO)) {
         add_faults(a, "bad", &x->imu_tally);
-        add_count(a, "gyro_saturated", f->n_gyro_saturated);
-        add_count(a, "gyro_spikes", f->n_gyro_spikes);
-        add_count(a, "gyro_gaps", f->n_gyro_gaps);
-        add_count(a, "accel_left_out", f->n_accel_bad);
-        add_count(a, "mag_left_out", f->n_mag_bad);
+        evt_json_count(a, "gyro_saturated", f->n_gyro_saturated);
+        evt_json_count(a, "gyro_spikes", f->n_gyro_spikes);
+        evt_json_count(a, "gyro_gaps", f->n_gyro_gaps);
+        evt_json_count(a, "accel_left_out", f->n_accel_bad);
+        evt_json_count(a, "mag_left_out", f->n_mag_bad);
     } else if (r->attitude == EVT_ATTITUDE_TRUTH) {
         add_faults(a, "bad", &x->poses_tally);
     }
@@ -152,17 +130,17 @@ static void add_all(cJSON *root, const evt_replay_t *r, const evt_replay_options
                     const char *failure)
 {
     const double n = (x->n_events > 0u) ? (double)x->n_events : 1.0;
-    add_text(root, "program", "evstab replay");
-    add_text(root, "library_version", EVS_VERSION_STRING);
-    if (failure != NULL) { add_text(root, "failure", failure); }
+    evt_json_text(root, "program", "evstab replay");
+    evt_json_text(root, "library_version", EVS_VERSION_STRING);
+    if (failure != NULL) { evt_json_text(root, "failure", failure); }
     add_settings(root, r, o);
-    add_seconds(root, "t_first_s", x->t_first_us);
-    add_seconds(root, "t_last_s", x->t_last_us);
-    add_seconds(root, "duration_s", x->t_last_us - x->t_first_us);
+    evt_json_seconds(root, "t_first_s", x->t_first_us);
+    evt_json_seconds(root, "t_last_s", x->t_last_us);
+    evt_json_seconds(root, "duration_s", x->t_last_us - x->t_first_us);
     add_events(root, x);
     add_attitude(root, r, x);
-    add_count(root, "windows", x->n_windows);
-    add_count(root, "saccades", x->n_saccades);
+    evt_json_count(root, "windows", x->n_windows);
+    evt_json_count(root, "saccades", x->n_saccades);
     add_measure(root, "wall_s", (double)x->wall_ns * 1e-9);
     add_measure(root, "ns_per_event", (double)x->wall_ns / n);
     add_measure(root, "library_ns_per_event", (double)x->library_ns / n);

@@ -298,7 +298,7 @@ def test_bad_input():
     replay("missing last line end", good[:-1], 0, ">2000 events", n_lines=0)
     replay("CR LF", good.replace("\n", "\r\n"), 0, ">2000 events", n_lines=0)
     replay("exponents", "".join(f"{1 + i * 1e-4:.18e} {i % 240:.6e} {i % 180:.6e} 1.0e+00\n" for i in range(100)), 0, ">100 events", n_lines=0)
-    replay("one event", "1.0 1 1 1\n", 0, ">1 events", n_lines=0)
+    replay("one event", "1.0 1 1 1\n", 0, ">1 event", n_lines=0)
     replay("many faults", good + "x\n1.3 999 1 1\n1.3 1 1\n0.1 1 1 1\n", 0,
            r"skipped 4 lines of many_faults\.txt: 2 malformed \(first: line 2001\), 1 off the sensor \(first: line 2002\), "
            r"1 where time runs back \(first: line 2004\)")
