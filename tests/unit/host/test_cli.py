@@ -228,7 +228,11 @@ def test_terminal():
         return
     write("long/events.txt", events(400000, step=0.000001))
     write("long/calib.txt", CALIB)
-    master, slave = pty.openpty()
+    try:
+        master, slave = pty.openpty()
+    except OSError as error:  # A container without /dev/pts.
+        print(f"not tried: progress on a terminal ({error})")
+        return
     done = subprocess.Popen([EVSTAB, "replay", "long", "-o", "out/long", "--write", "events"], cwd=ROOT, stdout=subprocess.DEVNULL, stderr=slave)
     os.close(slave)
     text = b""
