@@ -14,6 +14,7 @@ enum { W = 64, H = 48, STEP = 1, N_FIFO = 256, N_RING = 8, N_BATCH = 32, COLS = 
 static evs_pipeline_t p;
 static uint64_t memory[BYTES / 8u + 1u]; /* the last word is a canary */
 static evs_camera_config_t camera;
+static double spin_rad_s; /* how fast the camera turns about its y axis, on top of its swing */
 
 static evs_pipeline_config_t config(evs_pipeline_source_t source)
 {
@@ -40,12 +41,16 @@ void setUp(void)
 {
     memory[BYTES / 8u] = UINT64_C(0x5A5A5A5A5A5A5A5A);
     camera = evs_camera_config_ideal(W, H, evs_q_from_double(FOCAL, 16));
+    spin_rad_s = 0.0;
 }
 void tearDown(void) { TEST_ASSERT_TRUE_MESSAGE(memory[BYTES / 8u] == UINT64_C(0x5A5A5A5A5A5A5A5A), "wrote past"); }
 
 /* --- a small world: a camera that swings, and events all over the sensor ----------------------------------------- */
 
-static model_quat_t swing(double t_s) { return model_exp(0.05 * sin(9.0 * t_s), 0.12 * sin(7.0 * t_s), 0.3 * t_s); }
+static model_quat_t swing(double t_s)
+{
+    return model_exp(0.05 * sin(9.0 * t_s), 0.12 * sin(7.0 * t_s) + spin_rad_s * t_s, 0.3 * t_s);
+}
 
 static evs_orientation_t swing_sample(uint32_t t_us, uint32_t t0_us)
 {
@@ -127,14 +132,14 @@ static void fly(uint32_t t0_us, size_t n, size_t lot)
     pull_all();
 }
 
-static void test_points_follow_the_real_motion_within_the_allowed_smear(void)
+/* The points of a flight of n events against the motion itself. */
+static void assert_points_follow(uint32_t t0_us, size_t n, size_t n_checked_min)
 {
     evs_pipeline_config_t cfg = config(EVS_PIPELINE_ORIENTATION);
     cfg.stabilize.saccade_px_q4 = EVS_STABILIZE_SACCADE_OFF;
     init(&cfg);
-    const uint32_t t0_us = 0xFFFF0000u; /* the clock wraps during the flight */
-    fly(t0_us, 5000u, 40u);
-    TEST_ASSERT_EQUAL_UINT(5000u, n_out);
+    fly(t0_us, n, 40u);
+    TEST_ASSERT_EQUAL_UINT(n, n_out);
     const double cx = (W - 1) / 2.0, cy = (H - 1) / 2.0;
     size_t n_checked = 0u;
     for (size_t i = 0; i < n_out; i++) {
@@ -153,9 +158,23 @@ static void test_points_follow_the_real_motion_within_the_allowed_smear(void)
         TEST_ASSERT_DOUBLE_WITHIN(tolerance, cy + FOCAL * r[1] / r[2], out_stabilized[i].y_q4 / 16.0);
         n_checked++;
     }
-    TEST_ASSERT_TRUE(n_checked > 4900u);
+    TEST_ASSERT_TRUE(n_checked > n_checked_min);
+}
+
+static void test_points_follow_the_real_motion_within_the_allowed_smear(void)
+{
+    assert_points_follow(0xFFFF0000u, 5000u, 4900u); /* the clock wraps during the flight */
     TEST_ASSERT_EQUAL_UINT(50u, n_ends);
     TEST_ASSERT_EQUAL_UINT32(4999u / 100u, out_window[n_out - 1u]);
+}
+
+static void test_fast_turns_smear_no_more_in_long_slices_and_in_short_ones(void)
+{
+    static const double SPINS[] = {8.0, 30.0}; /* the longest slice just smears by 1/4 px; slices of a quarter of it */
+    for (size_t i = 0; i < 2u; i++) {
+        spin_rad_s = SPINS[i];
+        assert_points_follow(1000u, (size_t)(4000.0 / SPINS[i]), 100u);
+    }
 }
 
 static void test_output_does_not_depend_on_how_the_input_is_split(void)
@@ -502,6 +521,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_points_follow_the_real_motion_within_the_allowed_smear);
+    RUN_TEST(test_fast_turns_smear_no_more_in_long_slices_and_in_short_ones);
     RUN_TEST(test_output_does_not_depend_on_how_the_input_is_split);
     RUN_TEST(test_window_rotation_turns_the_whole_window_by_its_first_event);
     RUN_TEST(test_saccade_is_flagged_on_the_window_that_starts_the_new_reference);

@@ -7,7 +7,8 @@
  * Model    "Qn" is an integer with n fractional bits, its width from the C type: int32_t a_q30 holds a * 2^30.
  *          Angles are binary angles: int32_t, 2^32 = one turn, so that wrap-around is the integer's own.
  * Memory   none; the functions are pure.
- * Cost     inline ones a few instructions; the others 20..90 on a Cortex-M4 (docs/performance.md). No division.
+ * Cost     inline ones a few instructions; on a Cortex-M4F (counted in QEMU, -O2) reciprocal 41, reciprocal root 62,
+ *          exponential 80, root 106, sine and cosine 119, atan2 156. No division.
  * Numeric  integers only, bit-exact on every target. "Rounds" means to nearest, halves towards plus infinity.
  *          Errors stated below are worst cases over the whole domain, tested in tests/unit/test_fixed.c.
  * Threads  no state.

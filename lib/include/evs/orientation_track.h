@@ -5,8 +5,7 @@
  * @brief The recent orientations of the camera, and its orientation at the time of any event.
  *
  * Model    Between two samples a cubic Hermite curve in the rotation vector, whose ends have the samples' orientations
- *          and rates. Past the newest sample rate and angular acceleration are held, up to max_predict_us. On hand
- *          motion at 95 Hz the error is 0.008 deg against 0.049 deg for spherical interpolation.
+ *          and rates. Past the newest sample rate and angular acceleration are held, up to max_predict_us.
  * Memory   caller-owned: one evs_orientation_track_t and a ring of at least EVS_ORIENTATION_TRACK_MIN samples of 32 B.
  * Cost     push O(1); query O(samples newer than t) and one logarithm and one exponential: the larger part of the new
  *          orientation that docs/performance.md counts.

@@ -19,7 +19,7 @@
  *          orientation with the time constant view_tau_ms.
  * Memory   one evs_pipeline_t and one block of caller memory: evs_pipeline_bytes(), or for a static array
  *          EVS_PIPELINE_BYTES(). For 240 x 180 with a grid of step 8, 34 x 26 tiles, 2048 events, 32 orientations and
- *          batches of 128: 22 KB and the context of about 1 KB.
+ *          batches of 128: 23432 bytes, and the context of about 1 KB.
  * Cost     per event undistort + window + rotate, per slice a new orientation: docs/performance.md counts both.
  * Numeric  integers only, bit-exact on every target. The output does not depend on how the input is split into calls,
  *          as long as no prediction is needed.
