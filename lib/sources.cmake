@@ -10,11 +10,14 @@ set(EVS_SOURCES
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_camera.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_clock.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_fixed.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_gauss_table.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_homography.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_homography_avx2.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_homography_dsp.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_homography_mve.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_image.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_iwe.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_iwe_render.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_orientation_track.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_pipeline.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_recip_table.c

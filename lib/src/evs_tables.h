@@ -1,0 +1,12 @@
+/* SPDX-License-Identifier: MIT
+ * SPDX-FileCopyrightText: 2026 the evstab authors */
+/* Tables that the scripts of tests/vectors make. Private. */
+#ifndef EVS_TABLES_H
+#define EVS_TABLES_H
+
+#include <stdint.h>
+
+/* exp(-d^2 / 2) / sqrt(2 pi) in Q16 for d = (k - 3) - (i - 8) / 16; [i][7] = 0. */
+extern const uint16_t evs_gauss_q16[16][8];
+
+#endif
