@@ -151,15 +151,17 @@ evs_vec3_t evs_rotvec_of_rate(evs_vec3_t rate_rad_s_q24, int32_t t_us)
     return evs_vec3_scale(rate_rad_s_q24, t_s_q30, 26);
 }
 
+/* Twice a product, in Q30. 64 bits: at half a turn it is 2.0, which 32 cannot hold. */
+static inline int64_t doubled(int32_t a, int32_t b) { return evs_shr_r64((int64_t)a * b, 29); }
+
 evs_mat3_t evs_quat_to_mat3(evs_quat_t q)
 {
-    /* Doubled products in Q30: a b / 2^29. */
-    const int32_t xx = evs_q_mul(q.x, q.x, 29), yy = evs_q_mul(q.y, q.y, 29), zz = evs_q_mul(q.z, q.z, 29);
-    const int32_t xy = evs_q_mul(q.x, q.y, 29), xz = evs_q_mul(q.x, q.z, 29), yz = evs_q_mul(q.y, q.z, 29);
-    const int32_t wx = evs_q_mul(q.w, q.x, 29), wy = evs_q_mul(q.w, q.y, 29), wz = evs_q_mul(q.w, q.z, 29);
-    const evs_mat3_t m = {{{EVS_ONE_Q30 - yy - zz, xy - wz, xz + wy},
-                           {xy + wz, EVS_ONE_Q30 - xx - zz, yz - wx},
-                           {xz - wy, yz + wx, EVS_ONE_Q30 - xx - yy}}};
+    const int64_t xx = doubled(q.x, q.x), yy = doubled(q.y, q.y), zz = doubled(q.z, q.z);
+    const int64_t xy = doubled(q.x, q.y), xz = doubled(q.x, q.z), yz = doubled(q.y, q.z);
+    const int64_t wx = doubled(q.w, q.x), wy = doubled(q.w, q.y), wz = doubled(q.w, q.z);
+    const evs_mat3_t m = {{{(int32_t)(EVS_ONE_Q30 - yy - zz), (int32_t)(xy - wz), (int32_t)(xz + wy)},
+                           {(int32_t)(xy + wz), (int32_t)(EVS_ONE_Q30 - xx - zz), (int32_t)(yz - wx)},
+                           {(int32_t)(xz - wy), (int32_t)(yz + wx), (int32_t)(EVS_ONE_Q30 - xx - yy)}}};
     return m;
 }
 

@@ -160,6 +160,20 @@ static void test_rotation_of_vectors_agrees_with_the_model_and_with_the_matrix(v
     }
 }
 
+static void test_matrix_of_half_a_turn_is_exact(void)
+{
+    static const evs_quat_t HALF[] = {{0, EVS_ONE_Q30, 0, 0}, {0, 0, -EVS_ONE_Q30, 0}, {0, 0, 0, EVS_ONE_Q30}};
+    for (int axis = 0; axis < 3; axis++) {
+        const evs_mat3_t m = evs_quat_to_mat3(HALF[axis]);
+        for (int i = 0; i < 3; i++) {
+            for (int j = 0; j < 3; j++) {
+                const int32_t one = (i == axis) ? EVS_ONE_Q30 : -EVS_ONE_Q30;
+                TEST_ASSERT_EQUAL_INT32((i == j) ? one : 0, m.m[i][j]);
+            }
+        }
+    }
+}
+
 static model_quat_t model_exp(double x, double y, double z)
 {
     const double a = sqrt(x * x + y * y + z * z);
@@ -244,6 +258,7 @@ int main(void)
     RUN_TEST(test_product_and_conjugate_follow_hamilton);
     RUN_TEST(test_normalize_brings_any_length_to_one);
     RUN_TEST(test_rotation_of_vectors_agrees_with_the_model_and_with_the_matrix);
+    RUN_TEST(test_matrix_of_half_a_turn_is_exact);
     RUN_TEST(test_exponential_is_within_its_bound_for_small_and_for_whole_turns);
     RUN_TEST(test_logarithm_inverts_the_exponential_up_to_half_a_turn);
     RUN_TEST(test_rate_leads_from_one_orientation_to_the_other);
