@@ -18,6 +18,7 @@ set(EVS_SOURCES
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_image.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_iwe.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_iwe_render.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_keyframes.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_orientation_track.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_pipeline.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_recip_table.c
