@@ -10,6 +10,7 @@ set(EVS_SOURCES
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_camera.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_clock.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_fixed.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow_grid.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_gauss_table.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_homography.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_homography_avx2.c
