@@ -9,6 +9,10 @@ set(EVS_SOURCES
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_attitude_valenti.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_camera.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_clock.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_egomotion.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_egomotion_pack.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_egomotion_refine.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_egomotion_search.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_fixed.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow_grid.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_gauss_table.c
@@ -23,6 +27,7 @@ set(EVS_SOURCES
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_orientation_track.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_pipeline.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_recip_table.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_scaled.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_stabilize.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_tiles.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_types.c

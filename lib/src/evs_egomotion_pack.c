@@ -1,0 +1,138 @@
+/* SPDX-License-Identifier: MIT
+ * SPDX-FileCopyrightText: 2026 the evstab authors */
+/* Flow vectors to 16 bits, and order statistics. */
+#include "evs_egomotion_private.h"
+
+#include <string.h>
+
+#define POSITION_LIMIT (INT32_C(8) << 24)
+
+/* --- order ------------------------------------------------------------------------------------------------------ */
+
+/* 6 bits of exponent, 10 of mantissa. */
+uint16_t ego_key(uint64_t x)
+{
+    if (x < 1024u) { return (uint16_t)x; }
+    const unsigned shift = 53u - evs_clz64(x);                 /* leaves 11 bits, the first of them 1 */
+    return (uint16_t)((shift << 10) + (uint32_t)(x >> shift)); /* the leading 1 adds one to the exponent */
+}
+
+uint64_t ego_key_value(uint16_t key)
+{
+    if (key < 2048u) { return key; }
+    const unsigned shift = ((unsigned)key >> 10) - 1u;
+    return (((uint64_t)(key & 1023u) + 1024u) << shift) + (UINT64_C(1) << (shift - 1u));
+}
+
+/* Of the keys whose bits above shift + n_bits are those of prefix: the group of the next n_bits that holds the k-th. */
+static uint32_t narrow(const uint16_t *key, uint32_t n, uint32_t prefix, unsigned shift, unsigned n_bits, uint32_t *k)
+{
+    uint16_t count[64];
+    memset(count, 0, sizeof count);
+    const uint32_t mask = (UINT32_C(1) << n_bits) - 1u;
+    for (uint32_t i = 0u; i < n; i++) {
+        const uint32_t head = (uint32_t)key[i] >> shift;
+        if ((head >> n_bits) == prefix) { count[head & mask]++; }
+    }
+    uint32_t group = 0u;
+    while ((group < mask) && (*k >= count[group])) {
+        *k -= count[group];
+        group++;
+    }
+    return (prefix << n_bits) | group;
+}
+
+uint16_t ego_select(const uint16_t *key, uint32_t n, uint32_t k)
+{
+    uint32_t prefix = narrow(key, n, 0u, 10u, 6u, &k);
+    prefix = narrow(key, n, prefix, 5u, 5u, &k);
+    return (uint16_t)narrow(key, n, prefix, 0u, 5u, &k);
+}
+
+/* --- packing ---------------------------------------------------------------------------------------------------- */
+
+static bool position_ok(const evs_egomotion_flow_t *f)
+{
+    return (f->x_q24 >= -POSITION_LIMIT) && (f->x_q24 < POSITION_LIMIT) && (f->y_q24 >= -POSITION_LIMIT) &&
+           (f->y_q24 < POSITION_LIMIT);
+}
+
+static bool is_still(const evs_egomotion_flow_t *f) { return (f->u_q24 == 0) && (f->v_q24 == 0); }
+
+static uint64_t length_sq(const evs_egomotion_flow_t *f)
+{
+    return (uint64_t)((int64_t)f->u_q24 * f->u_q24) + (uint64_t)((int64_t)f->v_q24 * f->v_q24);
+}
+
+static int64_t to_steps(const evs_egomotion_result_t *scale, int32_t q24)
+{
+    return evs_shr_r64((int64_t)q24 * (int64_t)scale->scale_, scale->scale_shift_);
+}
+
+static uint64_t magnitude(int64_t x) { return (uint64_t)((x < 0) ? -x : x); }
+
+bool ego_pack_one(const evs_egomotion_result_t *scale, const evs_egomotion_flow_t *flow, ego_vector_t *packed)
+{
+    if (!position_ok(flow) || is_still(flow)) { return false; }
+    /* Q24 with 1 = 2^24 to 1 = 2^(14 - position_shift_); the last value of the range must not round up out of 16 bits */
+    const unsigned shift = 10u + scale->position_shift_;
+    packed->x = evs_sat16(evs_shr_r(flow->x_q24, shift));
+    packed->y = evs_sat16(evs_shr_r(flow->y_q24, shift));
+    int64_t u = to_steps(scale, flow->u_q24);
+    int64_t v = to_steps(scale, flow->v_q24);
+    const uint64_t longer = (magnitude(u) > magnitude(v)) ? magnitude(u) : magnitude(v);
+    if (longer >= (UINT64_C(1) << 30)) { /* keep the squares in range */
+        const unsigned down = 34u - evs_clz64(longer);
+        u >>= down;
+        v >>= down;
+    }
+    const uint64_t sq = (uint64_t)(u * u) + (uint64_t)(v * v);
+    if (sq > (uint64_t)EGO_CLIP * EGO_CLIP) {
+        unsigned root_shift;
+        const uint32_t r = evs_rsqrt_u64(sq, &root_shift); /* 1 / length = r 2^-root_shift */
+        const int64_t factor = (int64_t)r * EGO_CLIP;      /* up to 2^45: take 30 bits */
+        u = evs_shr_r64(u * (factor >> 15), root_shift - 15u);
+        v = evs_shr_r64(v * (factor >> 15), root_shift - 15u);
+    }
+    packed->u = (int16_t)u;
+    packed->v = (int16_t)v;
+    return true;
+}
+
+uint32_t ego_steps_to_q24(const evs_egomotion_result_t *scale, uint32_t steps)
+{
+    const uint64_t x = ((uint64_t)steps * scale->median_flow_q24) >> EGO_MEDIAN_BITS;
+    return (x < UINT32_MAX) ? (uint32_t)x : UINT32_MAX;
+}
+
+void ego_pack(ego_set_t *set, const evs_egomotion_flow_t *flow, size_t n, evs_egomotion_result_t *result)
+{
+    uint32_t reach = 0u; /* bits of the largest coordinate */
+    set->n = 0u;
+    for (size_t i = 0u; i < n; i++) {
+        if (!position_ok(&flow[i])) {
+            result->n_rejected++;
+        } else if (!is_still(&flow[i])) {
+            reach |= evs_abs_u32(flow[i].x_q24) | evs_abs_u32(flow[i].y_q24);
+            set->key[set->n++] = ego_key(length_sq(&flow[i]));
+        }
+    }
+    result->n_flow = set->n;
+    if (set->n == 0u) { return; }
+
+    const uint32_t median =
+        evs_sqrt_u64(ego_key_value(ego_select(set->key, set->n, set->n / 2u))); /* at least 1: nothing here is still */
+    unsigned recip_shift;
+    const uint32_t recip = evs_recip_u32(median, &recip_shift); /* 1 / median = recip / 2^recip_shift */
+    result->median_flow_q24 = median;
+    result->scale_ = recip >> 1; /* 31 bits: times any int32_t it leaves room for rounding */
+    result->scale_shift_ = (uint8_t)(recip_shift - 1u - (unsigned)EGO_MEDIAN_BITS);
+    result->position_shift_ =
+        (uint8_t)((reach >= (UINT32_C(4) << 24)) ? 2u : ((reach >= (UINT32_C(2) << 24)) ? 1u : 0u));
+    set->one_bits = 13u - result->position_shift_;
+
+    ego_vector_t *out = set->vec;
+    for (size_t i = 0u; i < n; i++) {
+        if (ego_pack_one(result, &flow[i], out)) { out++; }
+    }
+}
