@@ -9,6 +9,7 @@ set(EVS_SOURCES
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_attitude_valenti.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_camera.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_clock.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_decay_table.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_egomotion.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_egomotion_pack.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_egomotion_refine.c
@@ -29,6 +30,7 @@ set(EVS_SOURCES
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_recip_table.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_scaled.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_stabilize.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_surface.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_tiles.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_types.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_undistort.c

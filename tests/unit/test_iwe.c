@@ -139,6 +139,8 @@ static void test_votes_follow_the_equation(void)
     for (int vote = EVS_IWE_NEAREST; vote <= EVS_IWE_GAUSSIAN; vote++) {
         const evs_iwe_config_t cfg = config(W, H, (evs_iwe_vote_t)vote);
         make_points(W, H);
+        points[3] = point(16 * (W - 1) + 7, 16 * (H - 1) + 7); /* the last ones inside */
+        points[4] = point(-8, -8);
         const uint32_t n_votes = model_votes((evs_iwe_vote_t)vote, W, H, N_POINTS);
         TEST_ASSERT_TRUE((n_votes > N_POINTS / 3) && (n_votes < N_POINTS));
         const size_t n_bytes = init(&cfg);
@@ -151,7 +153,9 @@ static void test_votes_follow_the_equation(void)
             TEST_ASSERT_TRUE(fabs(votes / ONE[vote] - want[i]) <= TOLERANCE[vote] * n_votes);
             TEST_ASSERT_TRUE(fabs(votes / ONE[vote] - want[i]) <= TOLERANCE[vote] * 40 + 0.02 * want[i]);
         }
-        TEST_ASSERT_EQUAL_HEX8_MESSAGE(GUARD, memory.bytes[n_bytes], "wrote past the memory");
+        for (size_t i = EVS_IWE_VOTES_BYTES_(W, H, vote); i <= n_bytes; i++) {
+            TEST_ASSERT_EQUAL_HEX8_MESSAGE(GUARD, memory.bytes[i], "voted past the votes");
+        }
     }
 }
 
