@@ -9,13 +9,16 @@ set(EVS_SOURCES
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_attitude_valenti.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_camera.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_clock.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_corners.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_decay_table.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_egomotion.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_egomotion_pack.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_egomotion_refine.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_egomotion_search.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_fixed.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow_grid.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow_plain.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_gauss_table.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_homography.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_homography_avx2.c

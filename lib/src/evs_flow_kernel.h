@@ -1,0 +1,64 @@
+/* SPDX-License-Identifier: MIT
+ * SPDX-FileCopyrightText: 2026 the evstab authors */
+/* The loops over a window. Private to the kernels; every variant must give these bits. */
+#ifndef EVS_FLOW_KERNEL_H
+#define EVS_FLOW_KERNEL_H
+
+#include "evs/fixed.h"
+#include "evs/flow.h"
+#include "evs_simd.h"
+
+/* Where a window lies: its first sample is between px[0], px[1] and the two below, at weights that add up to 256. */
+typedef struct {
+    const uint8_t *px;
+    size_t pitch; /* from one row to the next */
+    uint32_t w00, w01, w10, w11;
+} evs_flow_place_t;
+
+/* Sums of products of gradients over the window, in (grey/px)^2 * 64: at most 31^2 * 1020^2 < 2^30. */
+typedef struct {
+    int32_t xx, xy, yy;
+} evs_flow_texture_t;
+
+/* Sums of gradient times difference, * 256: at most 31^2 * 1020 * 8160 < 2^33. */
+typedef struct {
+    int64_t x, y;
+} evs_flow_pull_t;
+
+/* Interpolate the window and the pixels around it, store template and gradients in `flow`, and sum their products.
+ * Reads window_px + 3 rows and columns, from px[-pitch - 1] on. */
+void evs_flow_template_plain(evs_flow_t *flow, evs_flow_place_t at, evs_flow_texture_t *texture);
+
+/* The window less the template, against the gradients. Reads window_px + 1 rows of n_pitch * stride_px + 1 columns. */
+void evs_flow_pull_plain(const evs_flow_t *flow, evs_flow_place_t at, evs_flow_pull_t *pull);
+
+/* Sum of the absolute differences of the window and the template, Q5: at most 31^2 * 8160. */
+uint32_t evs_flow_difference_plain(const evs_flow_t *flow, evs_flow_place_t at);
+
+/* Bilinear weights of a fraction in [0, 256). Rows and columns add up to what they must: position is exact along both
+ * axes, and only the mixed term is rounded. None is negative: 256 w00 = (256 - fx)(256 - fy) within 128. */
+static inline void evs_flow_set_weights(evs_flow_place_t *at, uint32_t fx, uint32_t fy)
+{
+    at->w11 = (fx * fy + 128u) >> 8;
+    at->w01 = fx - at->w11;
+    at->w10 = fy - at->w11;
+    at->w00 = 256u - fx - fy + at->w11;
+}
+
+/* Grey value Q5 between four pixels: at most 8160. The sum stays below 2^16, so it may be formed in 16 bits. */
+static inline int32_t evs_flow_blend(const uint8_t *px, const evs_flow_place_t *at)
+{
+    const uint8_t *const below = px + at->pitch;
+    return (int32_t)((px[0] * at->w00 + px[1] * at->w01 + below[0] * at->w10 + below[1] * at->w11 + 4u) >> 3);
+}
+
+#define EVS_FLOW_GREY_MAX     (255 * 32)
+#define EVS_FLOW_GRADIENT_MAX (255 * 4) /* Q3, and half the difference of two neighbours: (b - a) / 2 * 8 / 32 */
+EVS_STATIC_ASSERT(EVS_FLOW_WINDOW_MAX_PX *EVS_FLOW_WINDOW_MAX_PX *EVS_FLOW_GRADIENT_MAX *EVS_FLOW_GRADIENT_MAX <
+                      (UINT32_C(1) << 30),
+                  "sums of products of gradients");
+
+/* Gradient Q3 from the greys Q5 before and after. */
+static inline int32_t evs_flow_gradient(int32_t before, int32_t after) { return (after - before + 4) >> 3; }
+
+#endif

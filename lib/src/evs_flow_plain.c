@@ -1,0 +1,101 @@
+/* SPDX-License-Identifier: MIT
+ * SPDX-FileCopyrightText: 2026 the evstab authors */
+#include "evs_flow_kernel.h"
+
+/* One row of the interpolated template: pixels first, first + step, .. up to n. */
+static void blend_row(int16_t *row, const uint8_t *px, const evs_flow_place_t *at, size_t first, size_t step, size_t n)
+{
+    for (size_t x = first; x < n; x += step) { row[x] = (int16_t)evs_flow_blend(px + x, at); }
+}
+
+/* Row i of the template from three interpolated rows. */
+static void template_row(evs_flow_t *flow, size_t i, const int16_t *above, const int16_t *here, const int16_t *below,
+                         evs_flow_texture_t *texture)
+{
+    const size_t stride = flow->cfg.stride_px;
+    int16_t *const grey = flow->grey_q5 + i * flow->n_pitch;
+    int16_t *const dx = flow->dx_q3 + i * flow->n_pitch;
+    int16_t *const dy = flow->dy_q3 + i * flow->n_pitch;
+    int32_t xx = 0, xy = 0, yy = 0;
+    size_t c = 0u;
+    for (size_t x = 1u; c < flow->n_side; x += stride) {
+        const int32_t gx = evs_flow_gradient(here[x - 1u], here[x + 1u]);
+        const int32_t gy = evs_flow_gradient(above[x], below[x]);
+        grey[c] = here[x];
+        dx[c] = (int16_t)gx;
+        dy[c] = (int16_t)gy;
+        xx += gx * gx;
+        xy += gx * gy;
+        yy += gy * gy;
+        c++;
+    }
+    for (; c < flow->n_pitch; c++) {
+        grey[c] = 0;
+        dx[c] = 0;
+        dy[c] = 0;
+    }
+    texture->xx += xx;
+    texture->xy += xy;
+    texture->yy += yy;
+}
+
+void evs_flow_template_plain(evs_flow_t *flow, evs_flow_place_t at, evs_flow_texture_t *texture)
+{
+    const size_t width = flow->cfg.window_px + 2u;
+    const size_t stride = flow->cfg.stride_px;
+    int16_t *row[3];
+    for (size_t k = 0u; k < 3u; k++) { row[k] = flow->rows + k * EVS_FLOW_ROW(flow->cfg.window_px); }
+
+    *texture = (evs_flow_texture_t){0, 0, 0};
+    const uint8_t *px = at.px - at.pitch - 1;
+    size_t i = 0u;
+    for (size_t y = 0u; y < width; y++) {
+        /* Of the rows between two sampled ones only what lies above and below a sample is needed. */
+        const bool sampled = (stride == 1u) || ((y & 1u) != 0u);
+        blend_row(row[2], px, &at, sampled ? 0u : 1u, sampled ? 1u : 2u, width);
+        if ((y >= 2u) && ((stride == 1u) || !sampled)) { template_row(flow, i++, row[0], row[1], row[2], texture); }
+        int16_t *const oldest = row[0];
+        row[0] = row[1];
+        row[1] = row[2];
+        row[2] = oldest;
+        px += at.pitch;
+    }
+}
+
+void evs_flow_pull_plain(const evs_flow_t *flow, evs_flow_place_t at, evs_flow_pull_t *pull)
+{
+    const size_t stride = flow->cfg.stride_px;
+    const int16_t *grey = flow->grey_q5;
+    const int16_t *dx = flow->dx_q3;
+    const int16_t *dy = flow->dy_q3;
+    *pull = (evs_flow_pull_t){0, 0};
+    for (size_t i = 0u; i < flow->n_side; i++) {
+        int32_t x = 0, y = 0; /* at most 31 * 1020 * 8160 < 2^28 */
+        for (size_t c = 0u; c < flow->n_side; c++) {
+            const int32_t difference = evs_flow_blend(at.px + c * stride, &at) - grey[c];
+            x += dx[c] * difference;
+            y += dy[c] * difference;
+        }
+        pull->x += x;
+        pull->y += y;
+        at.px += stride * at.pitch;
+        grey += flow->n_pitch;
+        dx += flow->n_pitch;
+        dy += flow->n_pitch;
+    }
+}
+
+uint32_t evs_flow_difference_plain(const evs_flow_t *flow, evs_flow_place_t at)
+{
+    const size_t stride = flow->cfg.stride_px;
+    const int16_t *grey = flow->grey_q5;
+    uint32_t sum = 0u;
+    for (size_t i = 0u; i < flow->n_side; i++) {
+        for (size_t c = 0u; c < flow->n_side; c++) {
+            sum += evs_abs_u32(evs_flow_blend(at.px + c * stride, &at) - grey[c]);
+        }
+        at.px += stride * at.pitch;
+        grey += flow->n_pitch;
+    }
+    return sum;
+}
