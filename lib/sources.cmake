@@ -19,6 +19,7 @@ set(EVS_SOURCES
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow_grid.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow_plain.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow_sse2.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_gauss_table.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_homography.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_homography_avx2.c

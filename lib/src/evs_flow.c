@@ -207,7 +207,7 @@ static bool iterate(evs_flow_t *flow, const evs_image_t *from_image, const evs_i
     view_t view = view_of(from_image);
     evs_flow_texture_t texture;
     solver_t inverse;
-    evs_flow_template_plain(flow, place(flow, &view, from), &texture);
+    evs_flow_template(flow, place(flow, &view, from), &texture);
     if (!invert(flow, &texture, &inverse)) { return false; }
 
     const int32_t reach_q8 = (flow->cfg.window_px / 2) * 256;
@@ -215,7 +215,7 @@ static bool iterate(evs_flow_t *flow, const evs_image_t *from_image, const evs_i
     view = view_of(to_image);
     for (uint16_t i = 0u; i < flow->cfg.n_iterations; i++) {
         evs_flow_pull_t pull;
-        evs_flow_pull_plain(flow, place(flow, &view, *to), &pull);
+        evs_flow_pull(flow, place(flow, &view, *to), &pull);
         const int32_t pull_x = evs_sat32(pull.x);
         const int32_t pull_y = evs_sat32(pull.y);
         const int32_t x_q8 = step_q8(inverse.xx, pull_x, inverse.xy, pull_y, inverse.shift, reach_q8);
@@ -284,7 +284,7 @@ static evs_flow_status_t track_one(evs_flow_t *flow, const evs_pyramid_t *from, 
 
     view_t view = view_of(second);
     const uint32_t n = (uint32_t)flow->n_side * flow->n_side;
-    const uint32_t difference_q5 = evs_flow_difference_plain(flow, place(flow, &view, found));
+    const uint32_t difference_q5 = evs_flow_difference(flow, place(flow, &view, found));
     track->residual_q8 = (uint16_t)((difference_q5 * 8u + n / 2u) / n);
     if ((flow->cfg.max_backward_q8 > 0u) && !returns(flow, first, second, track)) {
         track->residual_q8 = 0u;

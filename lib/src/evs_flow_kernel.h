@@ -35,6 +35,38 @@ void evs_flow_pull_plain(const evs_flow_t *flow, evs_flow_place_t at, evs_flow_p
 /* Sum of the absolute differences of the window and the template, Q5: at most 31^2 * 8160. */
 uint32_t evs_flow_difference_plain(const evs_flow_t *flow, evs_flow_place_t at);
 
+/* The same, eight samples at a time: SSE2, which every x86-64 has. They read up to EVS_FLOW_PATCH_COLUMNS() less the spare
+ * columns in a row, and store what they like past n_side. */
+void evs_flow_template_sse2(evs_flow_t *flow, evs_flow_place_t at, evs_flow_texture_t *texture);
+void evs_flow_pull_sse2(const evs_flow_t *flow, evs_flow_place_t at, evs_flow_pull_t *pull);
+uint32_t evs_flow_difference_sse2(const evs_flow_t *flow, evs_flow_place_t at);
+
+/* The one of this build. */
+static inline void evs_flow_template(evs_flow_t *flow, evs_flow_place_t at, evs_flow_texture_t *texture)
+{
+#if EVS_SIMD_X86
+    evs_flow_template_sse2(flow, at, texture);
+#else
+    evs_flow_template_plain(flow, at, texture);
+#endif
+}
+static inline void evs_flow_pull(const evs_flow_t *flow, evs_flow_place_t at, evs_flow_pull_t *pull)
+{
+#if EVS_SIMD_X86
+    evs_flow_pull_sse2(flow, at, pull);
+#else
+    evs_flow_pull_plain(flow, at, pull);
+#endif
+}
+static inline uint32_t evs_flow_difference(const evs_flow_t *flow, evs_flow_place_t at)
+{
+#if EVS_SIMD_X86
+    return evs_flow_difference_sse2(flow, at);
+#else
+    return evs_flow_difference_plain(flow, at);
+#endif
+}
+
 /* Bilinear weights of a fraction in [0, 256). Rows and columns add up to what they must: position is exact along both
  * axes, and only the mixed term is rounded. None is negative: 256 w00 = (256 - fx)(256 - fy) within 128. */
 static inline void evs_flow_set_weights(evs_flow_place_t *at, uint32_t fx, uint32_t fy)

@@ -121,7 +121,7 @@ typedef struct { /** Context. A complete type only so that you can place it: eve
 #define EVS_FLOW_PITCH(window, stride) ((EVS_FLOW_SIDE(window, stride) + 7u) / 8u * 8u)
 #define EVS_FLOW_SPARE_PX              2u /* The patch reaches farther on each side, so that a small step needs no new one. */
 #define EVS_FLOW_PATCH_COLUMNS(window, stride)                                                                         \
-    ((EVS_FLOW_PITCH(window, stride) * (stride) + 2u + 2u * EVS_FLOW_SPARE_PX + 3u) / 4u * 4u)
+    ((EVS_FLOW_PITCH(window, stride) * (stride) + 3u + 2u * EVS_FLOW_SPARE_PX + 3u) / 4u * 4u)
 #define EVS_FLOW_PATCH_ROWS(window) ((size_t)(window) + 3u + 2u * EVS_FLOW_SPARE_PX)
 #define EVS_FLOW_ROW(window)        (((size_t)(window) + 2u + 1u) / 2u * 2u)
 
