@@ -35,45 +35,60 @@ static inline uint32_t two_columns(uint32_t up, uint32_t mid, uint32_t down)
     return (up & LOW_BYTES) + 2u * (mid & LOW_BYTES) + (down & LOW_BYTES);
 }
 
+typedef struct { /* sums over four columns, two to a word */
+    uint32_t even;
+    uint32_t odd;
+} columns_t;
+
+static inline columns_t four_columns(const uint8_t *up, const uint8_t *mid, const uint8_t *down, size_t x)
+{
+    const uint32_t u = load_four(up + x);
+    const uint32_t m = load_four(mid + x);
+    const uint32_t d = load_four(down + x);
+    columns_t c = {0u, 0u};
+    if ((u | m | d) != 0u) { /* most of an image is dark */
+        c.even = two_columns(u, m, d);
+        c.odd = two_columns(u >> 8, m >> 8, d >> 8);
+    }
+    return c;
+}
+
 static void smooth_bytes(const uint8_t *up, const uint8_t *mid, const uint8_t *down, size_t width, uint32_t *row)
 {
     const size_t in_fours = width & ~(size_t)3u;
     const size_t last = width - 1u;
     uint32_t left = column(up, mid, down, 0u); /* the column left of the four */
-    uint32_t even = 0u;
-    uint32_t odd = 0u;
-    if (in_fours > 0u) {
-        const uint32_t u = load_four(up), m = load_four(mid), d = load_four(down);
-        even = two_columns(u, m, d);
-        odd = two_columns(u >> 8, m >> 8, d >> 8);
-    }
-    for (size_t x = 0u; x < in_fours; x += 4u) {
-        uint32_t next_even = 0u;
-        uint32_t next_odd = 0u;
-        if (x + 4u < in_fours) {
-            const uint32_t u = load_four(up + x + 4u), m = load_four(mid + x + 4u), d = load_four(down + x + 4u);
-            next_even = two_columns(u, m, d);
-            next_odd = two_columns(u >> 8, m >> 8, d >> 8);
+    columns_t here = {0u, 0u};
+    if (in_fours > 0u) { here = four_columns(up, mid, down, 0u); }
+    for (size_t x = 4u; x <= in_fours; x += 4u) {
+        columns_t next = {0u, 0u};
+        if (x < in_fours) {
+            next = four_columns(up, mid, down, x);
         } else {
-            next_even = column(up, mid, down, (x + 4u < width) ? x + 4u : last);
+            next.even = column(up, mid, down, (x < width) ? x : last);
         }
-        const uint32_t sum_even = 2u * even + odd + ((odd << 16) | left);
-        const uint32_t sum_odd = 2u * odd + even + ((even >> 16) | (next_even << 16));
-        *row++ = (sum_even & LOW_HALF) | (sum_odd << 16);
-        *row++ = (sum_even >> 16) | (sum_odd & ~LOW_HALF);
-        left = odd >> 16;
-        even = next_even;
-        odd = next_odd;
+        if ((left | here.even | here.odd | next.even) != 0u) {
+            const uint32_t even = 2u * here.even + here.odd + ((here.odd << 16) | left);
+            const uint32_t odd = 2u * here.odd + here.even + ((here.even >> 16) | (next.even << 16));
+            row[0] = (even & LOW_HALF) | (odd << 16);
+            row[1] = (even >> 16) | (odd & ~LOW_HALF);
+        } else {
+            row[0] = 0u;
+            row[1] = 0u;
+        }
+        row += 2;
+        left = here.odd >> 16;
+        here = next;
     }
     for (size_t x = in_fours; x < width; x++) {
-        const uint32_t here = column(up, mid, down, x);
-        const uint32_t sum = left + 2u * here + column(up, mid, down, (x < last) ? x + 1u : last);
+        const uint32_t mine = column(up, mid, down, x);
+        const uint32_t sum = left + 2u * mine + column(up, mid, down, (x < last) ? x + 1u : last);
         if ((x & 1u) == 0u) {
             *row = sum;
         } else {
             *row++ |= sum << 16;
         }
-        left = here;
+        left = mine;
     }
 }
 
@@ -139,19 +154,19 @@ typedef struct { /* of the values that are not zero */
 static void add_moments(moments_t *m, const uint32_t *row, size_t n_words)
 {
     uint32_t sum = 0u; /* 2048 times 65535 at most */
-    uint64_t squares = m->sum_of_squares;
     uint32_t n = 0u;
     for (size_t i = 0u; i < n_words; i++) {
-        const uint32_t low = row[i] & LOW_HALF;
-        const uint32_t high = row[i] >> 16;
-        if (row[i] == 0u) { continue; }
-        sum += low + high;
-        squares += (uint64_t)low * low;
-        squares += (uint64_t)high * high;
-        n += (uint32_t)(low != 0u) + (uint32_t)(high != 0u);
+        const uint32_t two = row[i];
+        if (two != 0u) {
+            const uint32_t low = two & LOW_HALF;
+            const uint32_t high = two >> 16;
+            sum += low + high;
+            m->sum_of_squares += (uint64_t)low * low;
+            m->sum_of_squares += (uint64_t)high * high;
+            n += (uint32_t)(low != 0u) + (uint32_t)(high != 0u);
+        }
     }
     m->sum += sum;
-    m->sum_of_squares = squares;
     m->n += n;
 }
 
@@ -188,8 +203,14 @@ static void write_row(const uint32_t *row, size_t width, uint32_t white, uint32_
 {
     const size_t pairs = width / 2u;
     for (size_t i = 0u; i < pairs; i++) {
-        px[2u * i] = (uint8_t)grey(row[i] & LOW_HALF, white, gain);
-        px[2u * i + 1u] = (uint8_t)grey(row[i] >> 16, white, gain);
+        const uint32_t two = row[i];
+        if (two == 0u) {
+            px[2u * i] = 0u;
+            px[2u * i + 1u] = 0u;
+        } else {
+            px[2u * i] = (uint8_t)grey(two & LOW_HALF, white, gain);
+            px[2u * i + 1u] = (uint8_t)grey(two >> 16, white, gain);
+        }
     }
     if ((width & 1u) != 0u) { px[2u * pairs] = (uint8_t)grey(row[pairs] & LOW_HALF, white, gain); }
 }

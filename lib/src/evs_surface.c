@@ -75,13 +75,14 @@ static uint16_t stamp(const evs_surface_t *s, uint32_t n_ticks)
 /* Move the stamps up that are older than OLD_TICKS, seen n_ticks after the newest tick. */
 static void visit_rows(const evs_surface_t *s, uint32_t from, uint32_t to, uint32_t n_ticks)
 {
-    const uint32_t newest =
-        stamp(s, 0u) | 1u; /* so that the difference is twice the age, or 1 more, for any polarity */
+    /* Odd, so that the difference is twice the age, or 1 more, for any polarity. At the limit it is too old. */
+    const uint16_t newest = (uint16_t)(stamp(s, 0u) | 1u);
+    const uint16_t limit = (uint16_t)((n_ticks < OLD_TICKS) ? 2u * (OLD_TICKS - n_ticks) + 2u : 0u);
     const uint16_t old = stamp(s, n_ticks - OLD_TICKS);
-    const int32_t limit = (n_ticks < OLD_TICKS) ? (int32_t)(2u * (OLD_TICKS - n_ticks) + 1u) : -1;
     uint16_t *const end = s->stamps + (size_t)to * s->cfg.width_px;
     for (uint16_t *at = s->stamps + (size_t)from * s->cfg.width_px; at < end; at++) {
-        if ((int32_t)((newest - *at) & 0xFFFFu) > limit) { *at = old; }
+        const uint16_t twice_age = (uint16_t)(newest - *at);
+        *at = (twice_age >= limit) ? old : *at;
     }
 }
 
@@ -131,6 +132,17 @@ static void start(evs_surface_t *s, uint32_t t_us)
     for (size_t i = 0u; i < n_px; i++) { s->stamps[i] = old; }
 }
 
+/* An event that is not in the newest tick; false when it is in an earlier one. */
+static bool enter_tick(evs_surface_t *s, uint32_t since_us)
+{
+    if (since_us > (uint32_t)INT32_MAX) {
+        evs_count(&s->n_time_back);
+        return false;
+    }
+    advance(s, since_us >> TICK_BITS);
+    return true;
+}
+
 void evs_surface_add(evs_surface_t *surface, const evs_event_t *ev, const evs_point_t *points, size_t n)
 {
     EVS_ASSERT((surface != NULL) && (((ev != NULL) && (points != NULL)) || (n == 0u)));
@@ -139,30 +151,27 @@ void evs_surface_add(evs_surface_t *surface, const evs_event_t *ev, const evs_po
     const uint32_t width = surface->cfg.width_px;
     const uint32_t height = surface->cfg.height_px;
     uint16_t *const stamps = surface->stamps;
+    const evs_event_t *const end = ev + n;
     uint32_t tick_us = surface->tick_us;
     uint32_t now = stamp(surface, 0u);
-    size_t n_taken = 0u;
-    size_t n_back = 0u;
-    for (size_t i = 0u; i < n; i++) {
-        const uint32_t since_us = ev[i].t_us - tick_us;
+    size_t n_off = 0u;
+    for (; ev != end; ev++, points++) {
+        const uint32_t since_us = ev->t_us - tick_us;
         if (since_us >= EVS_SURFACE_TICK_US) {
-            if (since_us > (uint32_t)INT32_MAX) {
-                n_back++;
-                continue;
-            }
-            advance(surface, since_us >> TICK_BITS);
+            if (!enter_tick(surface, since_us)) { continue; }
             tick_us = surface->tick_us;
             now = stamp(surface, 0u);
         }
         /* The nearest pixel, as evs/tiles.h rounds; negative ones are beyond any width. */
-        const uint32_t x = (uint32_t)((points[i].x_q4 + 8) >> 4);
-        const uint32_t y = (uint32_t)((points[i].y_q4 + 8) >> 4);
-        if ((x >= width) || (y >= height)) { continue; }
-        stamps[y * width + x] = (uint16_t)(now | ((uint32_t)ev[i].y_px >> 15));
-        n_taken++;
+        const uint32_t x = (uint32_t)((points->x_q4 + 8) >> 4);
+        const uint32_t y = (uint32_t)((points->y_q4 + 8) >> 4);
+        if ((x < width) && (y < height)) {
+            stamps[y * width + x] = (uint16_t)(now | ((uint32_t)ev->y_px >> 15));
+        } else {
+            n_off++;
+        }
     }
-    evs_count_add(&surface->n_outside, n - n_back - n_taken);
-    evs_count_add(&surface->n_time_back, n_back);
+    evs_count_add(&surface->n_outside, n_off);
 }
 
 void evs_surface_end_window(evs_surface_t *surface, uint32_t duration_us)

@@ -6,8 +6,8 @@
 
 #include <stdint.h>
 
-/* exp(-d^2 / 2) / sqrt(2 pi) in Q16 for d = (k - 3) - (i - 8) / 16; [i][7] = 0. */
-extern const uint16_t evs_gauss_q16[16][8];
+/* exp(-d^2 / 2) / sqrt(2 pi) in Q15 for d = (k - 3) - (i - 8) / 16; [i][7] = 0. */
+extern const uint16_t evs_gauss_q15[16][8];
 
 /* 2^-((i + 1/2) / 256) in Q16. */
 extern const uint16_t evs_decay_q16[256];

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
  * SPDX-FileCopyrightText: 2026 the evstab authors */
-/* What bench_events.c and bench_attitude.c mark. bench_table.py reads the numbers from here: one "NAME = value" per line. */
+/* What the bench programs mark. bench_table.py reads the numbers from here: one "NAME = value" per line. */
 #ifndef EVS_BENCH_REGIONS_H
 #define EVS_BENCH_REGIONS_H
 
@@ -31,6 +31,26 @@ enum {
     BENCH_UPDATE_9D = 4,
     BENCH_REST_6D = 5,
     BENCH_REST_9D = 6
+};
+
+/* bench_images.c */
+enum {
+    BENCH_IMAGE_WIDTH = 240,
+    BENCH_IMAGE_HEIGHT = 180,
+    BENCH_IMAGES = 3,
+    BENCH_IMAGE_BATCHES = 48 /* of events, per image */
+};
+
+enum {
+    BENCH_IWE_NEAREST = 0,
+    BENCH_IWE_BILINEAR = 1,
+    BENCH_IWE_GAUSSIAN = 2,
+    BENCH_SURFACE = 3,
+    BENCH_RENDER_NEAREST = 4,
+    BENCH_RENDER_BILINEAR = 5,
+    BENCH_RENDER_GAUSSIAN = 6,
+    BENCH_RENDER_SURFACE = 7,
+    BENCH_HALVE = 8
 };
 
 #endif

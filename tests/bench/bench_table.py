@@ -38,6 +38,19 @@ PER_EVENT = [  # (row, regions that it adds up)
     ("**all: grid + window + rotation**", ["LOOKUP_GRID_TILES", "WINDOW", "ROTATE"]),
     ("pipeline with a full table: all of that, FIFO, chunks, and a slice and an IMU sample (6D) a ms", ["PIPELINE"]),
 ]
+PER_EVENT_OF_IMAGES = [
+    ("image of warped events, nearest vote", "IWE_NEAREST"),
+    ("image of warped events, bilinear votes", "IWE_BILINEAR"),
+    ("image of warped events, Gaussian of 7 x 7 px", "IWE_GAUSSIAN"),
+    ("time surface", "SURFACE"),
+]
+PER_PIXEL = [
+    ("image of nearest votes, smoothed and scaled", "RENDER_NEAREST"),
+    ("image of bilinear votes, smoothed and scaled", "RENDER_BILINEAR"),
+    ("image of Gaussian votes, scaled", "RENDER_GAUSSIAN"),
+    ("image of a time surface", "RENDER_SURFACE"),
+    ("half an image, per pixel of the whole", "HALVE"),
+]
 PER_CALL = [("new orientation, once per slice of at most 1 ms", "SLICE")]
 PER_UPDATE = [
     ("attitude: gyro sample", "GYRO"),
@@ -63,12 +76,14 @@ def table(head, rows):
 
 def generate(trees, plugin):
     number = constants()
-    counts, attitude = {}, {}
+    counts, attitude, images = {}, {}, {}
     for tree in trees:
         image = os.path.join(tree.path, "tests", "bench", "bench_events")
         counts[tree.name], _ = count(plugin, RUN_QEMU, TARGETS[tree.name][1], image)
         image = os.path.join(tree.path, "tests", "bench", "bench_attitude")
         attitude[tree.name], _ = count(plugin, RUN_QEMU, TARGETS[tree.name][1], image)
+        image = os.path.join(tree.path, "tests", "bench", "bench_images")
+        images[tree.name], _ = count(plugin, RUN_QEMU, TARGETS[tree.name][1], image)
 
     def per_call(name, tree, counts=counts, expected=number["BATCHES"]):
         calls, insns = counts[tree.name][number[name]]
@@ -79,7 +94,14 @@ def generate(trees, plugin):
     names = [TARGETS[tree.name][0] for tree in trees]
     rows = [[row] + [f"{sum(per_call(r, t) for r in regions) / number['EVENTS']:.1f}" for t in trees]
             for row, regions in PER_EVENT]
+    n_batches = number["IMAGES"] * number["IMAGE_BATCHES"]
+    rows += [[row] + [f"{per_call(region, t, images, n_batches) / number['EVENTS']:.1f}" for t in trees]
+             for row, region in PER_EVENT_OF_IMAGES]
     out = "Instructions per event:\n\n" + table(["step"] + names, rows)
+    n_px = number["IMAGE_WIDTH"] * number["IMAGE_HEIGHT"]
+    rows = [[row] + [f"{per_call(region, t, images, number['IMAGES']) / n_px:.1f}" for t in trees]
+            for row, region in PER_PIXEL]
+    out += "\nInstructions per pixel of an image of 12288 events at 240 x 180:\n\n" + table(["step"] + names, rows)
     rows = [[row] + [f"{per_call(region, t):.0f}" for t in trees] for row, region in PER_CALL]
     rows += [[row] + [f"{per_call(region, t, attitude, number['UPDATES']):.0f}" for t in trees]
              for row, region in PER_UPDATE]

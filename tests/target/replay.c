@@ -42,6 +42,7 @@ static void pull_all(replay_result_t *r)
             r->stabilized = crc_point(r->stabilized, chunk.stabilized[i]);
             if (evs_point_is_outside(chunk.stabilized[i])) { r->n_outside++; }
         }
+        replay_images_add(&r->images, &chunk);
         r->n_events += (uint32_t)chunk.n;
         if (chunk.end.reason != EVS_WINDOW_OPEN) {
             r->windows = crc_quat(crc_window(r->windows, &chunk.end), chunk.q_rc);
@@ -109,6 +110,7 @@ const char *replay_run(recording_read_fn read, void *source, const char *setting
     if (!choose(setting, &cfg)) { return "unknown setting"; }
     const evs_status_t status = evs_pipeline_init(&pipeline, &cfg, memory, sizeof memory);
     if (status != EVS_OK) { return evs_status_name(status); }
+    if (!replay_images_start(camera.width_px, camera.height_px)) { return "images refused"; }
 
     while ((kind = recording_next(&recording)) != RECORDING_END) {
         if (kind == RECORDING_BAD) { return "the recording is cut off"; }
@@ -140,5 +142,7 @@ void replay_print(const replay_result_t *r)
     printf("undistorted %08lx\n", (unsigned long)r->undistorted);
     printf("boundaries  %08lx\n", (unsigned long)r->windows);
     printf("stabilized  %08lx\n", (unsigned long)r->stabilized);
+    printf("iwe         %08lx\n", (unsigned long)r->images.iwe);
+    printf("surface     %08lx\n", (unsigned long)r->images.surface);
     printf("counters    %08lx\n", (unsigned long)r->counts);
 }

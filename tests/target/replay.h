@@ -10,6 +10,7 @@
 #define EVS_TESTS_REPLAY_H
 
 #include "recording.h"
+#include "replay_images.h"
 
 typedef struct {
     uint32_t n_events;
@@ -20,6 +21,7 @@ typedef struct {
     uint32_t undistorted;
     uint32_t windows;
     uint32_t stabilized;
+    replay_images_t images;
     uint32_t counts; /**< ... and of the counters of bad input. */
 } replay_result_t;
 
