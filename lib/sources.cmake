@@ -31,6 +31,7 @@ set(EVS_SOURCES
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_keyframes.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_orientation_track.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_pipeline.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_pipeline_imaging.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_recip_table.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_scaled.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_stabilize.c
@@ -40,6 +41,7 @@ set(EVS_SOURCES
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_undistort.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_undistort_mve.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_vec.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_velocity.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_wide.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_window.c
 )

@@ -6,8 +6,8 @@
 
 #define TARGET_MAX_Q4  4096u
 #define US_PER_S       UINT32_C(1000000)
-#define SPEED_SHARE_Q8 77 /* of the running mean: 0.3 */
-#define AGES_MAX       3u /* baselines: an older partner would show patches that have moved too far */
+#define SPEED_SHARE_Q8 128 /* of the newest pair in the running mean */
+#define AGES_MAX       3u  /* baselines: an older partner would show patches that have moved too far */
 
 enum { N_LINE = 64 }; /* pixels that are mapped in one call */
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
  * SPDX-FileCopyrightText: 2026 the evstab authors */
-#include "evs/pipeline.h"
+#include "evs_pipeline_private.h"
 
 #include <string.h>
 
@@ -8,22 +8,12 @@
 #define WAIT_MAX_US UINT32_C(1000000)
 #define TAU_MAX_MS  UINT32_C(100000)
 
-/* The camera after undistortion: the same sensor and K. */
-static evs_pinhole_t pinhole_of(const evs_camera_config_t *camera)
-{
-    const evs_pinhole_t pinhole = {.width_px = camera->width_px,
-                                   .height_px = camera->height_px,
-                                   .fx_q16 = camera->fx_q16,
-                                   .fy_q16 = camera->fy_q16,
-                                   .cx_q16 = camera->cx_q16,
-                                   .cy_q16 = camera->cy_q16};
-    return pinhole;
-}
+#define VOTES_PER_PX 12u /* of the tile that closes a window whose image shall be tracked */
 
 evs_pipeline_config_t evs_pipeline_config_default(const evs_camera_config_t *camera)
 {
     EVS_ASSERT(camera != NULL);
-    const evs_pinhole_t pinhole = pinhole_of(camera);
+    const evs_pinhole_t pinhole = evs_pipeline_pinhole(camera);
     const evs_pipeline_config_t cfg = {.camera = *camera,
                                        .table_step_px = 1u,
                                        .n_cols = 34u,
@@ -38,7 +28,26 @@ evs_pipeline_config_t evs_pipeline_config_default(const evs_camera_config_t *cam
                                        .max_wait_us = 20000u,
                                        .n_fifo = 2048u,
                                        .n_ring = 32u,
-                                       .n_batch = 128u};
+                                       .n_batch = 128u,
+                                       .image = EVS_PIPELINE_IMAGE_NONE,
+                                       .iwe = evs_iwe_config_default(camera->width_px, camera->height_px),
+                                       .surface = evs_surface_config_default(camera->width_px, camera->height_px),
+                                       .warp = EVS_PIPELINE_WARP_NONE,
+                                       .velocity_on = false,
+                                       .velocity = evs_velocity_config_default(&pinhole)};
+    return cfg;
+}
+
+evs_pipeline_config_t evs_pipeline_config_velocity(const evs_camera_config_t *camera)
+{
+    evs_pipeline_config_t cfg = evs_pipeline_config_default(camera);
+    const uint32_t n_tile_px = (uint32_t)(camera->width_px / cfg.n_cols) * (camera->height_px / cfg.n_rows);
+    const uint32_t threshold = VOTES_PER_PX * ((n_tile_px > 0u) ? n_tile_px : 1u);
+    cfg.window.threshold = (threshold < EVS_WINDOW_AREA_MAX) ? threshold : EVS_WINDOW_AREA_MAX;
+    cfg.window.min_duration_us = 5000u;
+    cfg.window.max_duration_us = 50000u;
+    cfg.image = EVS_PIPELINE_IMAGE_IWE;
+    cfg.velocity_on = true;
     return cfg;
 }
 
@@ -62,16 +71,11 @@ size_t evs_pipeline_bytes(const evs_pipeline_config_t *cfg)
 {
     if ((cfg == NULL) || !capacities_ok(cfg)) { return 0u; }
     const size_t step = (cfg->table != NULL) ? 0u : cfg->table_step_px;
-    return EVS_PIPELINE_BYTES(cfg->camera.width_px, cfg->camera.height_px, step, cfg->tile_table, n_tiles_of(cfg),
-                              cfg->n_fifo, cfg->n_ring, cfg->n_batch);
-}
-
-/* Cut the next part off the memory block. */
-static void *take(unsigned char **cursor, size_t bytes)
-{
-    unsigned char *const part = *cursor;
-    *cursor += EVS_PIPELINE_PART(bytes);
-    return part;
+    const size_t bytes = EVS_PIPELINE_BYTES(cfg->camera.width_px, cfg->camera.height_px, step, cfg->tile_table,
+                                            n_tiles_of(cfg), cfg->n_fifo, cfg->n_ring, cfg->n_batch);
+    if (cfg->image == EVS_PIPELINE_IMAGE_NONE) { return bytes; }
+    const size_t n_imaging = evs_pipeline_imaging_bytes(cfg);
+    return (n_imaging > 0u) ? bytes + n_imaging : 0u;
 }
 
 /*
@@ -103,6 +107,18 @@ static evs_status_t check_table(const evs_pipeline_config_t *cfg)
     return evs_camera_init(&scratch, &cfg->camera);
 }
 
+/* What an image needs is set up in the memory block at once: that is not the caller's context. */
+static evs_status_t init_imaging(const evs_pipeline_config_t *cfg, evs_pipeline_imaging_t **imaging,
+                                 unsigned char **cursor)
+{
+    *imaging = NULL;
+    if (cfg->image == EVS_PIPELINE_IMAGE_NONE) {
+        return (cfg->velocity_on || (cfg->warp != EVS_PIPELINE_WARP_NONE)) ? EVS_ERR_ARG : EVS_OK;
+    }
+    *imaging = evs_pipeline_take(cursor, sizeof **imaging);
+    return evs_pipeline_imaging_init(*imaging, cfg, cursor);
+}
+
 static evs_status_t check(const evs_pipeline_config_t *cfg, evs_orientation_t *ring, uint16_t *tile_counts)
 {
     evs_orientation_track_t track;
@@ -111,7 +127,7 @@ static evs_status_t check(const evs_pipeline_config_t *cfg, evs_orientation_t *r
     evs_quat_t q_ci;
     evs_status_t status = check_attitude(&cfg->attitude);
     if (status == EVS_OK) { status = check_table(cfg); }
-    if (status == EVS_OK) { status = check_stabilize(cfg, pinhole_of(&cfg->camera)); }
+    if (status == EVS_OK) { status = check_stabilize(cfg, evs_pipeline_pinhole(&cfg->camera)); }
     if (status == EVS_OK) { status = evs_orientation_track_init(&track, &cfg->track, ring, cfg->n_ring); }
     if (status == EVS_OK) { status = evs_window_init(&window, &cfg->window, tile_counts, n_tiles_of(cfg)); }
     if (status == EVS_OK) {
@@ -133,7 +149,7 @@ static evs_status_t init_undistort(evs_pipeline_t *p, unsigned char **cursor)
         evs_camera_t camera;
         status = evs_camera_init(&camera, &cfg->camera);
         const size_t n_points = EVS_UNDISTORT_POINTS(width_px, height_px, cfg->table_step_px);
-        evs_point_t *const points = take(cursor, n_points * sizeof points[0]);
+        evs_point_t *const points = evs_pipeline_take(cursor, n_points * sizeof points[0]);
         if (status == EVS_OK) {
             status = evs_undistort_build(&p->undistort, &camera, cfg->table_step_px, points, n_points);
         }
@@ -143,7 +159,7 @@ static evs_status_t init_undistort(evs_pipeline_t *p, unsigned char **cursor)
     if (status != EVS_OK) { return status; }
     if (!cfg->tile_table) { return evs_undistort_bind_tiles(&p->undistort, &grid, NULL, 0u); }
     const size_t n_pixels = EVS_UNDISTORT_TILES(width_px, height_px);
-    uint16_t *const tiles = take(cursor, n_pixels * sizeof tiles[0]);
+    uint16_t *const tiles = evs_pipeline_take(cursor, n_pixels * sizeof tiles[0]);
     return evs_undistort_build_tiles(&p->undistort, &grid, tiles, n_pixels);
 }
 
@@ -151,21 +167,26 @@ evs_status_t evs_pipeline_init(evs_pipeline_t *p, const evs_pipeline_config_t *c
 {
     if ((p == NULL) || (cfg == NULL) || (memory == NULL)) { return EVS_ERR_NULL; }
     if (!capacities_ok(cfg) || ((uint32_t)cfg->source > EVS_PIPELINE_NONE)) { return EVS_ERR_ARG; }
-    if ((n_bytes < evs_pipeline_bytes(cfg)) || (((uintptr_t)memory & 7u) != 0u)) { return EVS_ERR_SIZE; }
+    const size_t n_needed = evs_pipeline_bytes(cfg);
+    if (n_needed == 0u) { return EVS_ERR_ARG; }
+    if ((n_bytes < n_needed) || (((uintptr_t)memory & 7u) != 0u)) { return EVS_ERR_SIZE; }
 
     unsigned char *cursor = memory;
-    evs_orientation_t *const ring = take(&cursor, cfg->n_ring * sizeof ring[0]);
-    uint16_t *const tile_counts = take(&cursor, n_tiles_of(cfg) * sizeof tile_counts[0]);
-    const evs_status_t verdict = check(cfg, ring, tile_counts);
+    evs_orientation_t *const ring = evs_pipeline_take(&cursor, cfg->n_ring * sizeof ring[0]);
+    uint16_t *const tile_counts = evs_pipeline_take(&cursor, n_tiles_of(cfg) * sizeof tile_counts[0]);
+    evs_pipeline_imaging_t *imaging;
+    evs_status_t verdict = check(cfg, ring, tile_counts);
+    if (verdict == EVS_OK) { verdict = init_imaging(cfg, &imaging, &cursor); }
     if (verdict != EVS_OK) { return verdict; }
 
     memset(p, 0, sizeof *p);
     p->cfg = *cfg;
-    p->cfg.stabilize.pinhole = pinhole_of(&cfg->camera);
-    p->fifo = take(&cursor, cfg->n_fifo * sizeof p->fifo[0]);
-    p->undistorted = take(&cursor, cfg->n_batch * sizeof p->undistorted[0]);
-    p->stabilized = take(&cursor, cfg->n_batch * sizeof p->stabilized[0]);
-    p->tiles = take(&cursor, cfg->n_batch * sizeof p->tiles[0]);
+    p->imaging = imaging;
+    p->cfg.stabilize.pinhole = evs_pipeline_pinhole(&cfg->camera);
+    p->fifo = evs_pipeline_take(&cursor, cfg->n_fifo * sizeof p->fifo[0]);
+    p->undistorted = evs_pipeline_take(&cursor, cfg->n_batch * sizeof p->undistorted[0]);
+    p->stabilized = evs_pipeline_take(&cursor, cfg->n_batch * sizeof p->stabilized[0]);
+    p->tiles = evs_pipeline_take(&cursor, cfg->n_batch * sizeof p->tiles[0]);
     p->window_q_rc = evs_quat_identity();
     if (cfg->view_tau_ms > 0u) { p->view_per_us_q50 = (UINT64_C(1) << 50) / (cfg->view_tau_ms * UINT64_C(1000)); }
 
@@ -206,6 +227,13 @@ static void follow_attitude(evs_pipeline_t *p, uint32_t t_us, evs_quat_t attitud
     if (evs_quat_normalize(evs_quat_mul(step, carried), &p->view_q_wc) != EVS_OK) { p->view_q_wc = attitude_wc; }
 }
 
+static evs_status_t push_orientation(evs_pipeline_t *p, const evs_orientation_t *sample)
+{
+    const evs_status_t status = evs_orientation_track_push(&p->track, sample);
+    if ((status == EVS_OK) && p->cfg.velocity_on) { evs_velocity_push_orientation(&p->imaging->velocity, sample); }
+    return status;
+}
+
 void evs_pipeline_push_gyro(evs_pipeline_t *p, uint32_t t_us, evs_vec3_t rate_rad_s_q24)
 {
     EVS_ASSERT((p != NULL) && (p->cfg.source == EVS_PIPELINE_IMU));
@@ -213,7 +241,7 @@ void evs_pipeline_push_gyro(evs_pipeline_t *p, uint32_t t_us, evs_vec3_t rate_ra
     const evs_vec3_t rate_c = evs_quat_rotate(p->cfg.q_ci, evs_attitude_rate(&p->attitude));
     follow_attitude(p, t_us, evs_quat_mul(evs_attitude_orientation(&p->attitude), evs_quat_conj(p->cfg.q_ci)), rate_c);
     const evs_orientation_t sample = {.t_us = t_us, .q_wc = p->view_q_wc, .rate_rad_s_q24 = rate_c};
-    (void)evs_orientation_track_push(&p->track, &sample);
+    (void)push_orientation(p, &sample);
 }
 
 void evs_pipeline_push_accel(evs_pipeline_t *p, uint32_t t_us, evs_vec3_t accel_m_s2_q20)
@@ -231,7 +259,7 @@ void evs_pipeline_push_mag(evs_pipeline_t *p, uint32_t t_us, evs_vec3_t field_ut
 evs_status_t evs_pipeline_push_orientation(evs_pipeline_t *p, const evs_orientation_t *sample)
 {
     EVS_ASSERT((p != NULL) && (p->cfg.source == EVS_PIPELINE_ORIENTATION));
-    return evs_orientation_track_push(&p->track, sample);
+    return push_orientation(p, sample);
 }
 
 /* --- the FIFO: a ring whose head is the block ------------------------------------------------------------------- */
@@ -359,8 +387,10 @@ static void start_slice(evs_pipeline_t *p, uint32_t t_us)
     evs_stabilize_set_orientation(&p->stabilize, at.q_wc);
 }
 
-static void forget_window(evs_pipeline_t *p)
+/* A window has closed: its image, if any, and then nothing is left of it. */
+static void finish_window(evs_pipeline_t *p, evs_pipeline_chunk_t *chunk)
 {
+    if (p->imaging != NULL) { evs_pipeline_imaging_finish(p, chunk); }
     p->window_oriented = false;
     p->window_saccade = false;
     p->window_q_rc = evs_quat_identity();
@@ -386,8 +416,9 @@ static bool pull_end(evs_pipeline_t *p, evs_pipeline_chunk_t *chunk)
     p->finishing = false;
     p->restarting = false;
     evs_pipeline_chunk_t last = describe_window(p);
+    last.end.reason = reason; /* even of a window without an event, whose images may know older ones */
     const bool closed = evs_window_close(&p->window, reason, &last.end);
-    forget_window(p);
+    finish_window(p, &last);
     if (closed) { *chunk = last; }
     return closed;
 }
@@ -421,7 +452,7 @@ bool evs_pipeline_pull(evs_pipeline_t *p, evs_pipeline_chunk_t *chunk)
     const evs_event_t *const ev = &p->fifo[p->fifo_first + p->block_at];
     evs_pipeline_chunk_t next = describe_window(p);
     if (evs_window_expire(&p->window, ev[0].t_us, &next.end)) {
-        forget_window(p);
+        finish_window(p, &next);
         *chunk = next;
         return true;
     }
@@ -448,7 +479,8 @@ bool evs_pipeline_pull(evs_pipeline_t *p, evs_pipeline_chunk_t *chunk)
     next.n = n;
     rotate(p, next.undistorted, n, &p->stabilized[p->block_at]);
     p->block_at += n;
-    if (next.end.reason != EVS_WINDOW_OPEN) { forget_window(p); }
+    if (p->imaging != NULL) { evs_pipeline_imaging_add(p, ev, next.stabilized, n); }
+    if (next.end.reason != EVS_WINDOW_OPEN) { finish_window(p, &next); }
     *chunk = next;
     return true;
 }

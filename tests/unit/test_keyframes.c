@@ -89,8 +89,8 @@ static void test_first_speed_is_taken_as_it_is_and_later_ones_by_their_share(voi
 {
     evs_keyframes_learn(&k, 40u * 16u);
     TEST_ASSERT_EQUAL_UINT32(100u * MS, evs_keyframes_baseline_us(&k));
-    evs_keyframes_learn(&k, 80u * 16u); /* 40 + 0.3 * 40 */
-    TEST_ASSERT_UINT32_WITHIN(200u, 76923u, evs_keyframes_baseline_us(&k));
+    evs_keyframes_learn(&k, 80u * 16u); /* 40 + 0.5 * 40 */
+    TEST_ASSERT_UINT32_WITHIN(200u, 66667u, evs_keyframes_baseline_us(&k));
 }
 
 static void test_lost_patches_shorten_the_baseline_until_speed_is_seen_again(void)

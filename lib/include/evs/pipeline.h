@@ -7,6 +7,8 @@
  *          gyro, accel, mag --> attitude --> orientation track --+
  *                                                                v
  *          events --> FIFO --> undistort --> window --> stabilize --> chunks
+ *                                                          |
+ *                                     (warp) --> image --> velocity: corners, flow, egomotion
  *
  * Model    Push samples as they come; pull chunks until there are none. A chunk is a run of consecutive events of one
  *          window, undistorted and rotated to the reference orientation. An event waits in the FIFO until the
@@ -33,10 +35,13 @@
 #include "evs/attitude.h"
 #include "evs/camera.h"
 #include "evs/clock.h"
+#include "evs/iwe.h"
 #include "evs/orientation_track.h"
 #include "evs/stabilize.h"
+#include "evs/surface.h"
 #include "evs/tiles.h"
 #include "evs/undistort.h"
+#include "evs/velocity.h"
 #include "evs/window.h"
 
 #ifdef __cplusplus
@@ -49,6 +54,20 @@ typedef enum {
     EVS_PIPELINE_ORIENTATION = 1, /**< The caller: an autopilot's estimate, motion capture. */
     EVS_PIPELINE_NONE = 2         /**< Nowhere: events are undistorted and cut into windows, but not rotated. */
 } evs_pipeline_source_t;
+
+/** What a window becomes. */
+typedef enum {
+    EVS_PIPELINE_IMAGE_NONE = 0,
+    EVS_PIPELINE_IMAGE_COUNT = 1,  /**< Events per pixel: evs/iwe.h with the nearest vote and no smoothing. */
+    EVS_PIPELINE_IMAGE_IWE = 2,    /**< Image of warped events: smoothed and scaled, evs/iwe.h. */
+    EVS_PIPELINE_IMAGE_SURFACE = 3 /**< Time surface, evs/surface.h. */
+} evs_pipeline_image_t;
+
+/** How the points of a window are moved along the flow, to the middle of the window, before they are voted. */
+typedef enum {
+    EVS_PIPELINE_WARP_NONE = 0,
+    EVS_PIPELINE_WARP_PREDICTED = 1 /**< By the flow of an image pair before: streaming. Needs velocity_on. */
+} evs_pipeline_warp_t;
 
 typedef struct {                /** Settings; copied by evs_pipeline_init(). */
     evs_camera_config_t camera; /**< Lens and sensor. */
@@ -72,6 +91,12 @@ typedef struct {                /** Settings; copied by evs_pipeline_init(). */
     size_t n_fifo;                        /**< Events that can wait. [2, 2^24], default 2048. */
     size_t n_ring;                        /**< Orientations kept. At least 4, default 32. */
     size_t n_batch;                       /**< Most events in a chunk. [1, n_fifo], default 128. */
+    evs_pipeline_image_t image;           /**< Default NONE. */
+    evs_iwe_config_t iwe;                 /**< Image COUNT, IWE; its size is set from the camera. */
+    evs_surface_config_t surface;         /**< Image SURFACE; its size is set from the camera. */
+    evs_pipeline_warp_t warp;             /**< Image COUNT, IWE. Default NONE. */
+    bool velocity_on;                     /**< Measure the direction of flight; needs an image. Default false. */
+    evs_velocity_config_t velocity;       /**< Its pinhole is set from the camera, its time offset from the track. */
 } evs_pipeline_config_t;
 
 /** A run of consecutive events of one window. The arrays stay valid until the next call with this context. */
@@ -85,6 +110,8 @@ typedef struct {
     bool saccade;         /**< The window began with a saccade. */
     evs_quat_t q_rc;      /**< Reference from camera at the window's first event that has an orientation. */
     evs_window_end_t end; /**< reason EVS_WINDOW_OPEN, or the window closed after these events. */
+    evs_image_t image;    /**< When the window closed: its image, if there is one; else px is NULL. */
+    uint32_t image_t_us;  /**< Its time: the middle of the window, or the time to which a warp has moved the events. */
 } evs_pipeline_chunk_t;
 
 /** What happened to the input so far; each counter saturates. */
@@ -95,7 +122,25 @@ typedef struct {
     uint32_t n_off_sensor;        /**< Events off the sensor; they come out as outside. */
     uint32_t n_unoriented;        /**< Events whose orientation stayed unknown. */
     uint32_t n_orientations_back; /**< Orientations (gyro samples) dropped: time ran back. */
+    uint32_t n_images;            /**< Images made. */
+    uint32_t n_images_incomplete; /**< Windows without an image: flushed, restarted, or orientation unknown. */
+    uint32_t n_images_busy;       /**< Windows without an image: velocity was still at work on the one before. */
 } evs_pipeline_counts_t;
+
+typedef struct
+{ /** The part of the context that makes images; in the memory block, and only if there is one. Private. */
+    evs_iwe_t iwe;
+    evs_surface_t surface;
+    evs_velocity_t velocity;
+    evs_flow_grid_t flow; /* what the open window is warped by */
+    evs_quat_t flow_q_wr; /* the reference that it is seen from */
+    uint8_t *plane;       /* of the image, or for turning keyframes */
+    uint8_t *votes;       /* the memory of the IWE */
+    evs_point_t *warped;
+    uint32_t t_warp_us; /* the time to which the open window is warped */
+    bool warping;       /* the open window is being warped */
+    bool empty;         /* no event of the open window has been voted yet */
+} evs_pipeline_imaging_t;
 
 typedef struct { /** Context. A complete type only so that you can place it: every member is private. */
     evs_pipeline_config_t cfg;
@@ -110,6 +155,7 @@ typedef struct { /** Context. A complete type only so that you can place it: eve
     evs_stabilize_t stabilize;
     evs_clock_t clock;
     evs_pipeline_counts_t counts;
+    evs_pipeline_imaging_t *imaging; /* NULL: no images */
 
     evs_event_t *fifo; /* ring */
     size_t fifo_first;
@@ -149,8 +195,33 @@ typedef struct { /** Context. A complete type only so that you can place it: eve
                                  sizeof(evs_point_t)) +                                                                \
      EVS_PIPELINE_PART((tile_table) ? EVS_UNDISTORT_TILES(width_px, height_px) * sizeof(uint16_t) : 0u))
 
-/** Defaults for a camera. */
+/**
+ * What to add for images. A constant expression.
+ * @p image, @p warp, @p velocity_on as in the settings; @p vote and @p n_batch as there, too. With velocity_on EVS_VELOCITY_BYTES()
+ * comes on top.
+ */
+#define EVS_PIPELINE_IMAGE_BYTES(width_px, height_px, image, vote, warp, velocity_on, n_batch)                         \
+    (EVS_PIPELINE_PART(sizeof(evs_pipeline_imaging_t)) +                                                               \
+     EVS_PIPELINE_PART(((image) == EVS_PIPELINE_IMAGE_SURFACE) ? EVS_SURFACE_BYTES(width_px, height_px)                \
+                                                               : EVS_IWE_BYTES(width_px, height_px, vote)) +           \
+     EVS_PIPELINE_PART(                                                                                                \
+         ((velocity_on) && ((image) != EVS_PIPELINE_IMAGE_SURFACE)) ? 0u : EVS_IMAGE_BYTES(width_px, height_px)) +     \
+     EVS_PIPELINE_PART(((warp) == EVS_PIPELINE_WARP_PREDICTED) ? (n_batch) * sizeof(evs_point_t) : 0u))
+
+/** What to add for evs_pipeline_config_velocity() as it is: images of warped events and the direction of flight. */
+#define EVS_PIPELINE_VELOCITY_BYTES(width_px, height_px)                                                               \
+    (EVS_PIPELINE_IMAGE_BYTES(width_px, height_px, EVS_PIPELINE_IMAGE_IWE, EVS_IWE_NEAREST, EVS_PIPELINE_WARP_NONE,    \
+                              true, 0u) +                                                                              \
+     EVS_PIPELINE_PART(EVS_VELOCITY_DEFAULT_BYTES(width_px, height_px)))
+
+/** Defaults for a camera: no image, no velocity, the windows of the paper. */
 evs_pipeline_config_t evs_pipeline_config_default(const evs_camera_config_t *camera);
+
+/**
+ * Defaults for measuring the direction of flight: images of warped events, no warp, and windows by area that close with
+ * the 12th event per pixel of a tile, after 5 to 50 ms.
+ */
+evs_pipeline_config_t evs_pipeline_config_velocity(const evs_camera_config_t *camera);
 
 /** Bytes of memory that evs_pipeline_init() needs for these settings; 0 when they are out of range. */
 size_t evs_pipeline_bytes(const evs_pipeline_config_t *cfg);
@@ -189,6 +260,20 @@ bool evs_pipeline_pull(evs_pipeline_t *p, evs_pipeline_chunk_t *chunk);
  * (EVS_WINDOW_BY_FLUSH). The next push begins a new stream with the same attitude and reference.
  */
 void evs_pipeline_finish(evs_pipeline_t *p);
+
+/**
+ * Work on the newest image: one bounded piece, at most @p max_tracks (at least 1) tracks. Call it between pulls; a window
+ * that closes while an image is being worked on gives none. The result does not depend on max_tracks, as long as no
+ * image is left out.
+ * @return true when a result is there; only then is it written. False with nothing to do, or without velocity_on.
+ */
+bool evs_pipeline_velocity(evs_pipeline_t *p, size_t max_tracks, evs_velocity_result_t *result);
+
+/** Whether an image is being worked on: evs_pipeline_velocity() has something to do. */
+bool evs_pipeline_velocity_busy(const evs_pipeline_t *p);
+
+/** The part that measures the direction, for its tracks and counters; NULL without velocity_on. */
+const evs_velocity_t *evs_pipeline_velocity_part(const evs_pipeline_t *p);
 
 /** Newest orientation of the camera as the view uses it, in the time of its own clock. @return EVS_OK or EVS_ERR_STATE (none yet). */
 EVS_NODISCARD evs_status_t evs_pipeline_newest_orientation(const evs_pipeline_t *p, evs_orientation_t *newest);

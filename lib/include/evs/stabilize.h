@@ -82,6 +82,9 @@ void evs_stabilize_inverse(const evs_stabilize_t *st, evs_homography_t *inverse)
 /** q_C*, reference from camera, of the current rotation; identity before the first window. */
 static inline evs_quat_t evs_stabilize_rotation(const evs_stabilize_t *st) { return st->q_rc; }
 
+/** World from reference: the same bits until a saccade. Meaningless before the first window. */
+static inline evs_quat_t evs_stabilize_reference(const evs_stabilize_t *st) { return evs_quat_conj(st->q_rw); }
+
 #ifdef __cplusplus
 }
 #endif
