@@ -42,6 +42,8 @@ set(EVS_SOURCES
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_undistort_mve.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_vec.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_velocity.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_warp.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_warp_contrast.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_wide.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_window.c
 )

@@ -70,6 +70,35 @@ void evs_flow_grid_set_tile(evs_flow_grid_t *grid, uint16_t col, uint16_t row, e
     grid->tiles[(uint32_t)row * grid->n_cols + col] = v;
 }
 
+uint32_t evs_flow_grid_tile_of(const evs_flow_grid_t *grid, evs_point_t p)
+{
+    EVS_ASSERT(grid != NULL);
+    const int32_t x_q4 = p.x_q4 + 8;
+    const int32_t y_q4 = p.y_q4 + 8;
+    if ((x_q4 < 0) || (x_q4 >= (int32_t)(16u * (uint32_t)grid->width_px)) || (y_q4 < 0) ||
+        (y_q4 >= (int32_t)(16u * (uint32_t)grid->height_px))) {
+        return EVS_FLOW_GRID_TILES_MAX;
+    }
+    uint32_t col = ((uint32_t)x_q4 * grid->rcp_x_q25) >> EVS_FLOW_GRID_RCP_BITS;
+    uint32_t row = ((uint32_t)y_q4 * grid->rcp_y_q25) >> EVS_FLOW_GRID_RCP_BITS;
+    if (col >= grid->n_cols) { col = grid->n_cols - 1u; } /* the reciprocal is rounded up */
+    if (row >= grid->n_rows) { row = grid->n_rows - 1u; }
+    return row * grid->n_cols + col;
+}
+
+/* The centre of tile k along an axis, Q4 px from the centre of the first pixel. */
+static int16_t centre_q4(uint32_t k, uint32_t n_px, uint32_t n_tiles)
+{
+    return (int16_t)((int32_t)((2u * k + 1u) * 8u * n_px / n_tiles) - 8);
+}
+
+evs_point_t evs_flow_grid_centre(const evs_flow_grid_t *grid, uint16_t col, uint16_t row)
+{
+    EVS_ASSERT((grid != NULL) && (col < grid->n_cols) && (row < grid->n_rows));
+    const evs_point_t p = {centre_q4(col, grid->width_px, grid->n_cols), centre_q4(row, grid->height_px, grid->n_rows)};
+    return p;
+}
+
 /* --- medians --------------------------------------------------------------------------------------------------- */
 
 static void median_add(median_t *m, int16_t value)
@@ -98,22 +127,6 @@ static uint32_t median_agree(const median_t *m)
 
 /* --- samples into tiles ---------------------------------------------------------------------------------------- */
 
-/* The tile of a sample, or EVS_FLOW_GRID_TILES_MAX off the image. */
-static uint32_t tile_of(const evs_flow_grid_t *grid, evs_point_t p)
-{
-    const int32_t x_q4 = p.x_q4 + 8;
-    const int32_t y_q4 = p.y_q4 + 8;
-    if ((x_q4 < 0) || (x_q4 >= (int32_t)(16u * (uint32_t)grid->width_px)) || (y_q4 < 0) ||
-        (y_q4 >= (int32_t)(16u * (uint32_t)grid->height_px))) {
-        return EVS_FLOW_GRID_TILES_MAX;
-    }
-    uint32_t col = ((uint32_t)x_q4 * grid->rcp_x_q25) >> EVS_FLOW_GRID_RCP_BITS;
-    uint32_t row = ((uint32_t)y_q4 * grid->rcp_y_q25) >> EVS_FLOW_GRID_RCP_BITS;
-    if (col >= grid->n_cols) { col = grid->n_cols - 1u; } /* the reciprocal is rounded up */
-    if (row >= grid->n_rows) { row = grid->n_rows - 1u; }
-    return row * grid->n_cols + col;
-}
-
 /* Median of the samples of one tile, or of all on the image (tile = EVS_FLOW_GRID_TILES_MAX). n_in of them are there.
  * Returns whether enough of them agree with it. */
 static bool median_of_samples(const evs_flow_grid_t *grid, const evs_flow_sample_t *samples, size_t n, uint32_t tile,
@@ -124,7 +137,7 @@ static bool median_of_samples(const evs_flow_grid_t *grid, const evs_flow_sample
     median_t x = {.n = 0u};
     median_t y = {.n = 0u};
     for (size_t i = 0u; i < n; i++) {
-        const uint32_t of = tile_of(grid, samples[i].at);
+        const uint32_t of = evs_flow_grid_tile_of(grid, samples[i].at);
         if ((of == EVS_FLOW_GRID_TILES_MAX) || ((tile != EVS_FLOW_GRID_TILES_MAX) && (of != tile))) { continue; }
         if (wait == 0u) {
             median_add(&x, samples[i].v.x_px_s_q3);
@@ -224,7 +237,7 @@ size_t evs_flow_grid_fill(evs_flow_grid_t *grid, const evs_flow_sample_t *sample
     EVS_ASSERT((grid != NULL) && ((samples != NULL) || (n == 0u)));
     const uint32_t n_tiles = tile_count(grid);
     uint32_t n_in[EVS_FLOW_GRID_TILES_MAX + 1u] = {0};
-    for (size_t i = 0u; i < n; i++) { n_in[tile_of(grid, samples[i].at)]++; }
+    for (size_t i = 0u; i < n; i++) { n_in[evs_flow_grid_tile_of(grid, samples[i].at)]++; }
     const size_t n_on = n - n_in[EVS_FLOW_GRID_TILES_MAX];
     if (n_on == 0u) { return 0u; }
 

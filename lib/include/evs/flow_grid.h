@@ -92,6 +92,12 @@ void evs_flow_grid_blend(evs_flow_grid_t *grid, const evs_flow_grid_t *other, ui
 /** Velocity from a displacement over dt_us > 0, saturating. */
 evs_flow_velocity_t evs_flow_velocity_from(int32_t dx_px_q8, int32_t dy_px_q8, uint32_t dt_us);
 
+/** The tile of a point, counted row by row, or EVS_FLOW_GRID_TILES_MAX off the image. */
+uint32_t evs_flow_grid_tile_of(const evs_flow_grid_t *grid, evs_point_t p);
+
+/** The centre of a tile, to 1/16 px. */
+evs_point_t evs_flow_grid_centre(const evs_flow_grid_t *grid, uint16_t col, uint16_t row);
+
 /** Median of all samples of the last fill, or what evs_flow_grid_set_all() was given. */
 static inline evs_flow_velocity_t evs_flow_grid_global(const evs_flow_grid_t *grid) { return grid->global; }
 
