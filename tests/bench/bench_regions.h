@@ -53,4 +53,9 @@ enum {
     BENCH_HALVE = 8
 };
 
+/* bench_flow.c */
+enum { BENCH_TRACKS = 128 };
+
+enum { BENCH_CORNERS = 0, BENCH_TRACK_ALL = 1, BENCH_IMAGE_PAIR = 2 };
+
 #endif

@@ -62,6 +62,12 @@ PER_UPDATE = [
     ("attitude: 9D, at rest, bias being learnt", "REST_9D"),
 ]
 
+PER_IMAGE = [  # (row, region, how many there are in it)
+    ("corners of an image of 240×180", "CORNERS", "ONE"),
+    ("flow: a corner tracked, 31 px, every 2nd, 2 levels, there and back", "TRACK_ALL", "TRACKS"),
+    ("**image pair: corners, half, 128 tracks**", "IMAGE_PAIR", "ONE"),
+]
+
 
 def constants():
     with open(os.path.join(HERE, "bench_regions.h"), encoding="utf-8") as f:
@@ -76,7 +82,7 @@ def table(head, rows):
 
 def generate(trees, plugin):
     number = constants()
-    counts, attitude, images = {}, {}, {}
+    counts, attitude, images, flow = {}, {}, {}, {}
     for tree in trees:
         image = os.path.join(tree.path, "tests", "bench", "bench_events")
         counts[tree.name], _ = count(plugin, RUN_QEMU, TARGETS[tree.name][1], image)
@@ -84,6 +90,8 @@ def generate(trees, plugin):
         attitude[tree.name], _ = count(plugin, RUN_QEMU, TARGETS[tree.name][1], image)
         image = os.path.join(tree.path, "tests", "bench", "bench_images")
         images[tree.name], _ = count(plugin, RUN_QEMU, TARGETS[tree.name][1], image)
+        image = os.path.join(tree.path, "tests", "bench", "bench_flow")
+        flow[tree.name], _ = count(plugin, RUN_QEMU, TARGETS[tree.name][1], image)
 
     def per_call(name, tree, counts=counts, expected=number["BATCHES"]):
         calls, insns = counts[tree.name][number[name]]
@@ -105,6 +113,8 @@ def generate(trees, plugin):
     rows = [[row] + [f"{per_call(region, t):.0f}" for t in trees] for row, region in PER_CALL]
     rows += [[row] + [f"{per_call(region, t, attitude, number['UPDATES']):.0f}" for t in trees]
              for row, region in PER_UPDATE]
+    number["ONE"] = 1
+    rows += [[row] + [f"{per_call(region, t, flow, 1) / number[n]:.0f}" for t in trees] for row, region, n in PER_IMAGE]
     return out + "\nInstructions per call:\n\n" + table(["step"] + names, rows)
 
 
