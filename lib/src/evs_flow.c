@@ -66,9 +66,7 @@ evs_status_t evs_flow_init(evs_flow_t *flow, const evs_flow_config_t *cfg, void 
     *flow = (evs_flow_t){.cfg = *cfg,
                          .n_side = (uint16_t)EVS_FLOW_SIDE(window, stride),
                          .n_pitch = (uint16_t)EVS_FLOW_PITCH(window, stride),
-                         .grey_q5 = samples,
-                         .dx_q3 = samples + n,
-                         .dy_q3 = samples + 2u * n,
+                         .samples = samples,
                          .rows = samples + 3u * n,
                          .patch = (uint8_t *)(void *)(samples + 3u * n + 3u * EVS_FLOW_ROW(window)),
                          .patch_columns = (uint16_t)EVS_FLOW_PATCH_COLUMNS(window, stride),
@@ -127,7 +125,7 @@ static evs_flow_place_t place(const evs_flow_t *flow, view_t *view, evs_position
     const int32_t n_rows = flow->patch_rows - 2 * spare;
 
     evs_flow_place_t at;
-    evs_flow_set_weights(&at, (uint32_t)x_q8 & 255u, (uint32_t)y_q8 & 255u);
+    evs_flow_set_weights(&at, ((uint32_t)x_q8 & 255u) / 2u, ((uint32_t)y_q8 & 255u) / 2u);
     if ((x >= 0) && (y >= 0) && (x + n_columns <= view->image->width_px) && (y + n_rows <= view->image->height_px)) {
         at.pitch = view->image->width_px;
         at.px = view->image->px + (size_t)(y + 1) * at.pitch + (size_t)(x + 1);
@@ -159,13 +157,13 @@ static int32_t scale(int32_t entry, unsigned left, uint32_t reciprocal)
 
 /*
  * Invert the texture, unless its smaller eigenvalue is below the limit (that makes the determinant at least limit^2 >= 1).
- * The sums are 64 times the squares of gradients and the pull is 256 times gradient times difference, so the step is
- * pull / sums / 4 px, or 64 pull / sums in Q8: 64 adjugate / determinant.
+ * The sums are 4 times the squares of gradients and the pull is 256 times gradient times difference, so the step is
+ * pull / sums / 64 px, or 4 pull / sums in Q8: 4 adjugate / determinant.
  */
 static bool invert(const evs_flow_t *flow, const evs_flow_texture_t *t, solver_t *inverse)
 {
     const uint32_t n = (uint32_t)flow->n_side * flow->n_side;
-    const int32_t limit = (int32_t)((n * flow->cfg.min_eigen_q8 + 3u) / 4u);
+    const int32_t limit = (int32_t)((n * flow->cfg.min_eigen_q8 + 63u) / 64u);
     if ((t->xx < limit) || (t->yy < limit) || ((int64_t)(t->xx - limit) * (t->yy - limit) < (int64_t)t->xy * t->xy)) {
         return false;
     }
@@ -179,7 +177,7 @@ static bool invert(const evs_flow_t *flow, const evs_flow_texture_t *t, solver_t
     inverse->xx = scale(t->yy, left, recip);
     inverse->xy = -scale(t->xy, left, recip);
     inverse->yy = scale(t->xx, left, recip);
-    inverse->shift = left + recip_shift - det_zeros - 6u; /* in [21, 62]: the eigenvalues lie in [1, 2^30) */
+    inverse->shift = left + recip_shift - det_zeros - 2u; /* in [24, 58]: the eigenvalues lie in [1, 2^26) */
     return true;
 }
 
@@ -197,8 +195,16 @@ static int32_t within(int32_t v_q8, uint16_t n_px, int32_t reach_q8)
     return evs_clamp(v_q8, -reach_q8, (n_px - 1) * 256 + reach_q8);
 }
 
+static evs_position_t even(evs_position_t p)
+{
+    const evs_position_t e = {p.x_q8 & ~1, p.y_q8 & ~1};
+    return e;
+}
+
 /*
  * Take the template at `from`, and step from *to on until it fits. Positions are those of the level.
+ * Windows lie at multiples of 1/128 px. What a position has beyond that is not lost: it is the same displacement that is
+ * looked for, and a step counts from where the window lay.
  * false: no texture, *to is as it was.
  */
 static bool iterate(evs_flow_t *flow, const evs_image_t *from_image, const evs_image_t *to_image, evs_position_t from,
@@ -207,21 +213,25 @@ static bool iterate(evs_flow_t *flow, const evs_image_t *from_image, const evs_i
     view_t view = view_of(from_image);
     evs_flow_texture_t texture;
     solver_t inverse;
-    evs_flow_template(flow, place(flow, &view, from), &texture);
+    const evs_position_t origin = even(from);
+    evs_flow_template(flow, place(flow, &view, origin), &texture);
     if (!invert(flow, &texture, &inverse)) { return false; }
 
+    const int32_t beyond_x_q8 = from.x_q8 - origin.x_q8;
+    const int32_t beyond_y_q8 = from.y_q8 - origin.y_q8;
     const int32_t reach_q8 = (flow->cfg.window_px / 2) * 256;
     const uint32_t epsilon_q8 = flow->cfg.epsilon_q8;
     view = view_of(to_image);
     for (uint16_t i = 0u; i < flow->cfg.n_iterations; i++) {
         evs_flow_pull_t pull;
-        evs_flow_pull(flow, place(flow, &view, *to), &pull);
+        const evs_position_t at = even((evs_position_t){to->x_q8 - beyond_x_q8, to->y_q8 - beyond_y_q8});
+        evs_flow_pull(flow, place(flow, &view, at), &pull);
         const int32_t pull_x = evs_sat32(pull.x);
         const int32_t pull_y = evs_sat32(pull.y);
         const int32_t x_q8 = step_q8(inverse.xx, pull_x, inverse.xy, pull_y, inverse.shift, reach_q8);
         const int32_t y_q8 = step_q8(inverse.xy, pull_x, inverse.yy, pull_y, inverse.shift, reach_q8);
-        to->x_q8 = within(to->x_q8 - x_q8, to_image->width_px, reach_q8);
-        to->y_q8 = within(to->y_q8 - y_q8, to_image->height_px, reach_q8);
+        to->x_q8 = within(at.x_q8 + beyond_x_q8 - x_q8, to_image->width_px, reach_q8);
+        to->y_q8 = within(at.y_q8 + beyond_y_q8 - y_q8, to_image->height_px, reach_q8);
         if ((evs_abs_u32(x_q8) <= epsilon_q8) && (evs_abs_u32(y_q8) <= epsilon_q8)) { break; }
     }
     return true;
@@ -284,8 +294,8 @@ static evs_flow_status_t track_one(evs_flow_t *flow, const evs_pyramid_t *from, 
 
     view_t view = view_of(second);
     const uint32_t n = (uint32_t)flow->n_side * flow->n_side;
-    const uint32_t difference_q5 = evs_flow_difference(flow, place(flow, &view, found));
-    track->residual_q8 = (uint16_t)((difference_q5 * 8u + n / 2u) / n);
+    const uint32_t difference_q7 = evs_flow_difference(flow, place(flow, &view, found));
+    track->residual_q8 = (uint16_t)((difference_q7 * 2u + n / 2u) / n);
     if ((flow->cfg.max_backward_q8 > 0u) && !returns(flow, first, second, track)) {
         track->residual_q8 = 0u;
         return EVS_FLOW_LOST_BACKWARD;

@@ -8,19 +8,33 @@
 #include "evs/flow.h"
 #include "evs_simd.h"
 
-/* Where a window lies: its first sample is between px[0], px[1] and the two below, at weights that add up to 256. */
+/*
+ * The template is kept in groups of eight samples of a row: their greys Q7, then their gradients along x, then along y, Q1.
+ * Groups follow each other along a row and then row by row. Gradients of the samples past n_side are 0, and their greys
+ * of no account.
+ */
+#define EVS_FLOW_GROUP 24 /* int16_t in a group */
+enum { EVS_FLOW_DX = 8, EVS_FLOW_DY = 16 };
+
+/* Sample c of row i: its grey; its gradients are EVS_FLOW_DX and EVS_FLOW_DY behind. */
+static inline int16_t *evs_flow_sample(const evs_flow_t *flow, size_t i, size_t c)
+{
+    return flow->samples + (i * (flow->n_pitch / 8u) + c / 8u) * EVS_FLOW_GROUP + c % 8u;
+}
+
+/* Where a window lies: its first sample is between px[0], px[1] and the two below, at weights that add up to 128. */
 typedef struct {
     const uint8_t *px;
     size_t pitch; /* from one row to the next */
     uint32_t w00, w01, w10, w11;
 } evs_flow_place_t;
 
-/* Sums of products of gradients over the window, in (grey/px)^2 * 64: at most 31^2 * 1020^2 < 2^30. */
+/* Sums of products of gradients over the window, in (grey/px)^2 * 4: at most 31^2 * 255^2 < 2^26. */
 typedef struct {
     int32_t xx, xy, yy;
 } evs_flow_texture_t;
 
-/* Sums of gradient times difference, * 256: at most 31^2 * 1020 * 8160 < 2^33. */
+/* Sums of gradient times difference, * 256: at most 31^2 * 255 * 32640 < 2^33. */
 typedef struct {
     int64_t x, y;
 } evs_flow_pull_t;
@@ -32,7 +46,7 @@ void evs_flow_template_plain(evs_flow_t *flow, evs_flow_place_t at, evs_flow_tex
 /* The window less the template, against the gradients. Reads window_px + 1 rows of n_pitch * stride_px + 1 columns. */
 void evs_flow_pull_plain(const evs_flow_t *flow, evs_flow_place_t at, evs_flow_pull_t *pull);
 
-/* Sum of the absolute differences of the window and the template, Q5: at most 31^2 * 8160. */
+/* Sum of the absolute differences of the window and the template, Q7: at most 31^2 * 32640. */
 uint32_t evs_flow_difference_plain(const evs_flow_t *flow, evs_flow_place_t at);
 
 /* The same, eight samples at a time: SSE2, which every x86-64 has. They read up to EVS_FLOW_PATCH_COLUMNS() less the spare
@@ -67,30 +81,30 @@ static inline uint32_t evs_flow_difference(const evs_flow_t *flow, evs_flow_plac
 #endif
 }
 
-/* Bilinear weights of a fraction in [0, 256). Rows and columns add up to what they must: position is exact along both
- * axes, and only the mixed term is rounded. None is negative: 256 w00 = (256 - fx)(256 - fy) within 128. */
+/*
+ * Bilinear weights of a fraction in [0, 128). Rows and columns add up to what they must: position is exact along both
+ * axes, and only the mixed term is rounded. None is negative: 128 w00 = (128 - fx)(128 - fy) within 64.
+ */
 static inline void evs_flow_set_weights(evs_flow_place_t *at, uint32_t fx, uint32_t fy)
 {
-    at->w11 = (fx * fy + 128u) >> 8;
+    at->w11 = (fx * fy + 64u) >> 7;
     at->w01 = fx - at->w11;
     at->w10 = fy - at->w11;
-    at->w00 = 256u - fx - fy + at->w11;
+    at->w00 = 128u - fx - fy + at->w11;
 }
 
-/* Grey value Q5 between four pixels: at most 8160. The sum stays below 2^16, so it may be formed in 16 bits. */
+#define EVS_FLOW_GREY_MAX     (255 * 128) /* Q7: differences fit 16 bits, too */
+#define EVS_FLOW_GRADIENT_MAX 255         /* Q1: half the difference of two neighbours */
+EVS_STATIC_ASSERT(EVS_FLOW_GREY_MAX <= INT16_MAX, "greys and their differences are int16_t");
+
+/* Grey value Q7 between four pixels. */
 static inline int32_t evs_flow_blend(const uint8_t *px, const evs_flow_place_t *at)
 {
     const uint8_t *const below = px + at->pitch;
-    return (int32_t)((px[0] * at->w00 + px[1] * at->w01 + below[0] * at->w10 + below[1] * at->w11 + 4u) >> 3);
+    return (int32_t)(px[0] * at->w00 + px[1] * at->w01 + below[0] * at->w10 + below[1] * at->w11);
 }
 
-#define EVS_FLOW_GREY_MAX     (255 * 32)
-#define EVS_FLOW_GRADIENT_MAX (255 * 4) /* Q3, and half the difference of two neighbours: (b - a) / 2 * 8 / 32 */
-EVS_STATIC_ASSERT(EVS_FLOW_WINDOW_MAX_PX *EVS_FLOW_WINDOW_MAX_PX *EVS_FLOW_GRADIENT_MAX *EVS_FLOW_GRADIENT_MAX <
-                      (UINT32_C(1) << 30),
-                  "sums of products of gradients");
-
-/* Gradient Q3 from the greys Q5 before and after. */
-static inline int32_t evs_flow_gradient(int32_t before, int32_t after) { return (after - before + 4) >> 3; }
+/* Gradient Q1 from the greys Q7 before and after. */
+static inline int32_t evs_flow_gradient(int32_t before, int32_t after) { return (after - before + 64) >> 7; }
 
 #endif

@@ -9,30 +9,27 @@ static void blend_row(int16_t *row, const uint8_t *px, const evs_flow_place_t *a
 }
 
 /* Row i of the template from three interpolated rows. */
-static void template_row(evs_flow_t *flow, size_t i, const int16_t *above, const int16_t *here, const int16_t *below,
-                         evs_flow_texture_t *texture)
+static void template_row(const evs_flow_t *flow, size_t i, const int16_t *above, const int16_t *here,
+                         const int16_t *below, evs_flow_texture_t *texture)
 {
     const size_t stride = flow->cfg.stride_px;
-    int16_t *const grey = flow->grey_q5 + i * flow->n_pitch;
-    int16_t *const dx = flow->dx_q3 + i * flow->n_pitch;
-    int16_t *const dy = flow->dy_q3 + i * flow->n_pitch;
     int32_t xx = 0, xy = 0, yy = 0;
     size_t c = 0u;
     for (size_t x = 1u; c < flow->n_side; x += stride) {
-        const int32_t gx = evs_flow_gradient(here[x - 1u], here[x + 1u]);
-        const int32_t gy = evs_flow_gradient(above[x], below[x]);
-        grey[c] = here[x];
-        dx[c] = (int16_t)gx;
-        dy[c] = (int16_t)gy;
-        xx += gx * gx;
-        xy += gx * gy;
-        yy += gy * gy;
-        c++;
+        int16_t *const sample = evs_flow_sample(flow, i, c++);
+        const int32_t dx = evs_flow_gradient(here[x - 1u], here[x + 1u]);
+        const int32_t dy = evs_flow_gradient(above[x], below[x]);
+        sample[0] = here[x];
+        sample[EVS_FLOW_DX] = (int16_t)dx;
+        sample[EVS_FLOW_DY] = (int16_t)dy;
+        xx += dx * dx;
+        xy += dx * dy;
+        yy += dy * dy;
     }
     for (; c < flow->n_pitch; c++) {
-        grey[c] = 0;
-        dx[c] = 0;
-        dy[c] = 0;
+        int16_t *const sample = evs_flow_sample(flow, i, c);
+        sample[EVS_FLOW_DX] = 0;
+        sample[EVS_FLOW_DY] = 0;
     }
     texture->xx += xx;
     texture->xy += xy;
@@ -65,37 +62,31 @@ void evs_flow_template_plain(evs_flow_t *flow, evs_flow_place_t at, evs_flow_tex
 void evs_flow_pull_plain(const evs_flow_t *flow, evs_flow_place_t at, evs_flow_pull_t *pull)
 {
     const size_t stride = flow->cfg.stride_px;
-    const int16_t *grey = flow->grey_q5;
-    const int16_t *dx = flow->dx_q3;
-    const int16_t *dy = flow->dy_q3;
     *pull = (evs_flow_pull_t){0, 0};
     for (size_t i = 0u; i < flow->n_side; i++) {
-        int32_t x = 0, y = 0; /* at most 31 * 1020 * 8160 < 2^28 */
+        int32_t x = 0, y = 0; /* at most 31 * 255 * 32640 < 2^28 */
         for (size_t c = 0u; c < flow->n_side; c++) {
-            const int32_t difference = evs_flow_blend(at.px + c * stride, &at) - grey[c];
-            x += dx[c] * difference;
-            y += dy[c] * difference;
+            const int16_t *const sample = evs_flow_sample(flow, i, c);
+            const int32_t difference = evs_flow_blend(at.px + c * stride, &at) - sample[0];
+            x += sample[EVS_FLOW_DX] * difference;
+            y += sample[EVS_FLOW_DY] * difference;
         }
         pull->x += x;
         pull->y += y;
         at.px += stride * at.pitch;
-        grey += flow->n_pitch;
-        dx += flow->n_pitch;
-        dy += flow->n_pitch;
     }
 }
 
 uint32_t evs_flow_difference_plain(const evs_flow_t *flow, evs_flow_place_t at)
 {
     const size_t stride = flow->cfg.stride_px;
-    const int16_t *grey = flow->grey_q5;
     uint32_t sum = 0u;
     for (size_t i = 0u; i < flow->n_side; i++) {
         for (size_t c = 0u; c < flow->n_side; c++) {
-            sum += evs_abs_u32(evs_flow_blend(at.px + c * stride, &at) - grey[c]);
+            const int32_t grey = *evs_flow_sample(flow, i, c);
+            sum += evs_abs_u32(evs_flow_blend(at.px + c * stride, &at) - grey);
         }
         at.px += stride * at.pitch;
-        grey += flow->n_pitch;
     }
     return sum;
 }

@@ -9,29 +9,28 @@
 /*
  * Eight samples at a time, column by column of such groups, so that a row of pixels is loaded once and kept for the row
  * above it. With stride 2 the even bytes of a load are one pixel of each sample and the odd ones the next.
- * The weighted sums of bytes fit 16 bits without a sign.
  *
  * Sums of gradient times difference: a 32-bit lane takes 8 samples of each of 31 rows at most.
  */
 EVS_STATIC_ASSERT(INT64_C(31) * 8 * EVS_FLOW_GRADIENT_MAX * EVS_FLOW_GREY_MAX <= INT32_MAX, "lanes of a pull");
 
 typedef struct {
-    __m128i w00, w01, w10, w11, half;
+    __m128i w00, w01, w10, w11;
 } weights_t;
 
 static inline weights_t weights_of(const evs_flow_place_t *at)
 {
     const weights_t w = {_mm_set1_epi16((int16_t)at->w00), _mm_set1_epi16((int16_t)at->w01),
-                         _mm_set1_epi16((int16_t)at->w10), _mm_set1_epi16((int16_t)at->w11), _mm_set1_epi16(4)};
+                         _mm_set1_epi16((int16_t)at->w10), _mm_set1_epi16((int16_t)at->w11)};
     return w;
 }
 
-/* Grey Q5 from the pixels left and right in the upper and in the lower row. */
+/* Grey Q7 from the pixels left and right in the upper and in the lower row. */
 static inline __m128i blend(const weights_t *w, __m128i upper, __m128i upper_right, __m128i lower, __m128i lower_right)
 {
     const __m128i above = _mm_add_epi16(_mm_mullo_epi16(upper, w->w00), _mm_mullo_epi16(upper_right, w->w01));
     const __m128i below = _mm_add_epi16(_mm_mullo_epi16(lower, w->w10), _mm_mullo_epi16(lower_right, w->w11));
-    return _mm_srli_epi16(_mm_add_epi16(_mm_add_epi16(above, below), w->half), 3);
+    return _mm_add_epi16(above, below);
 }
 
 static inline __m128i load(const int16_t *p) { return _mm_loadu_si128((const __m128i *)(const void *)p); }
@@ -62,7 +61,7 @@ static inline __m128i present(size_t c, size_t n)
 
 static inline __m128i gradient(__m128i before, __m128i after)
 {
-    return _mm_srai_epi16(_mm_add_epi16(_mm_sub_epi16(after, before), _mm_set1_epi16(4)), 3);
+    return _mm_srai_epi16(_mm_add_epi16(_mm_sub_epi16(after, before), _mm_set1_epi16(64)), 7);
 }
 
 static inline int64_t sum_lanes(__m128i v)
@@ -103,10 +102,10 @@ static inline void make_template(evs_flow_t *flow, const evs_flow_place_t *at, e
             const __m128i below = blend(&w, second[1], second[2], third[1], third[2]);
             const __m128i dx = _mm_and_si128(gradient(left, right), mask);
             const __m128i dy = _mm_and_si128(gradient(above, below), mask);
-            const size_t to = i * flow->n_pitch + c;
-            store(flow->grey_q5 + to, here);
-            store(flow->dx_q3 + to, dx);
-            store(flow->dy_q3 + to, dy);
+            int16_t *const group = evs_flow_sample(flow, i, c);
+            store(group, here);
+            store(group + EVS_FLOW_DX, dx);
+            store(group + EVS_FLOW_DY, dy);
             xx = _mm_add_epi32(xx, _mm_madd_epi16(dx, dx));
             xy = _mm_add_epi32(xy, _mm_madd_epi16(dx, dy));
             yy = _mm_add_epi32(yy, _mm_madd_epi16(dy, dy));
@@ -141,17 +140,18 @@ static inline void make_pull(const evs_flow_t *flow, const evs_flow_place_t *at,
     __m128i x = _mm_setzero_si128(), y = x;
     for (size_t c = 0u; c < flow->n_pitch; c += 8u) {
         const uint8_t *px = at->px + c * stride;
-        size_t from = c;
+        const int16_t *group = evs_flow_sample(flow, 0u, c);
+        const size_t next_row = flow->n_pitch / 8u * EVS_FLOW_GROUP;
         __m128i upper[2], lower[2];
         pixels(upper, px, stride, 2u);
         for (size_t i = 0u; i < n; i++) {
             px += at->pitch;
             pixels(lower, px, stride, 2u);
             const __m128i grey = blend(&w, upper[0], upper[1], lower[0], lower[1]);
-            const __m128i difference = _mm_sub_epi16(grey, load(flow->grey_q5 + from));
-            x = _mm_add_epi32(x, _mm_madd_epi16(load(flow->dx_q3 + from), difference));
-            y = _mm_add_epi32(y, _mm_madd_epi16(load(flow->dy_q3 + from), difference));
-            from += flow->n_pitch;
+            const __m128i difference = _mm_sub_epi16(grey, load(group));
+            x = _mm_add_epi32(x, _mm_madd_epi16(load(group + EVS_FLOW_DX), difference));
+            y = _mm_add_epi32(y, _mm_madd_epi16(load(group + EVS_FLOW_DY), difference));
+            group += next_row;
             if (stride == 1u) {
                 upper[0] = lower[0];
                 upper[1] = lower[1];
@@ -180,17 +180,16 @@ static inline uint32_t make_difference(const evs_flow_t *flow, const evs_flow_pl
     __m128i sum = _mm_setzero_si128();
     for (size_t c = 0u; c < flow->n_pitch; c += 8u) {
         const uint8_t *px = at->px + c * stride;
-        const int16_t *from = flow->grey_q5 + c;
         const __m128i mask = present(c, flow->n_side);
         for (size_t i = 0u; i < flow->n_side; i++) {
             __m128i upper[2], lower[2];
             pixels(upper, px, stride, 2u);
             pixels(lower, px + at->pitch, stride, 2u);
-            const __m128i difference = _mm_sub_epi16(blend(&w, upper[0], upper[1], lower[0], lower[1]), load(from));
+            const __m128i difference =
+                _mm_sub_epi16(blend(&w, upper[0], upper[1], lower[0], lower[1]), load(evs_flow_sample(flow, i, c)));
             const __m128i size = _mm_max_epi16(difference, _mm_sub_epi16(_mm_setzero_si128(), difference));
             sum = _mm_add_epi32(sum, _mm_madd_epi16(_mm_and_si128(size, mask), _mm_set1_epi16(1)));
             px += stride * at->pitch;
-            from += flow->n_pitch;
         }
     }
     return (uint32_t)sum_lanes(sum);

@@ -13,7 +13,7 @@
  * Memory   one evs_flow_t, EVS_FLOW_BYTES() of caller memory, and EVS_PYRAMID_BYTES() for each image of more than one level.
  * Cost     independent of the size of the image; docs/performance.md counts it. Bounded: n_levels * n_iterations steps,
  *          and n_iterations for the way back.
- * Numeric  integers only, bit-exact on every target. Positions are Q8 px, grey values Q5 and gradients Q3 where they are
+ * Numeric  integers only, bit-exact on every target. Positions are Q8 px, grey values Q7 and gradients Q1 where they are
  *          multiplied, sums exact. No image content overflows; evs_flow.c has the proofs.
  * Threads  no shared state; one context must not be entered from two threads or ISRs at once.
  *
@@ -107,11 +107,9 @@ typedef struct { /** Context. A complete type only so that you can place it: eve
     evs_flow_config_t cfg;
     uint16_t n_side;  /* samples along a side of the window */
     uint16_t n_pitch; /* the same, rounded up to whole vectors */
-    int16_t *grey_q5; /* the template, n_side rows of n_pitch; samples past n_side are 0 in the gradients */
-    int16_t *dx_q3;
-    int16_t *dy_q3;
-    int16_t *rows;  /* three rows of the interpolated template */
-    uint8_t *patch; /* what a window near the border sees */
+    int16_t *samples; /* the template: see evs_flow_kernel.h */
+    int16_t *rows;    /* three rows of the interpolated template */
+    uint8_t *patch;   /* what a window near the border sees */
     uint16_t patch_columns;
     uint16_t patch_rows;
 } evs_flow_t;
