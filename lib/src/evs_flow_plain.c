@@ -13,23 +13,23 @@ static void template_row(const evs_flow_t *flow, size_t i, const int16_t *above,
                          const int16_t *below, evs_flow_texture_t *texture)
 {
     const size_t stride = flow->cfg.stride_px;
+    int16_t *sample = evs_flow_sample(flow, i, 0u);
     int32_t xx = 0, xy = 0, yy = 0;
-    size_t c = 0u;
-    for (size_t x = 1u; c < flow->n_side; x += stride) {
-        int16_t *const sample = evs_flow_sample(flow, i, c++);
-        const int32_t dx = evs_flow_gradient(here[x - 1u], here[x + 1u]);
-        const int32_t dy = evs_flow_gradient(above[x], below[x]);
-        sample[0] = here[x];
+    size_t x = 1u;
+    for (size_t c = 0u; c < flow->n_pitch; c++) {
+        int32_t dx = 0, dy = 0;
+        if (c < flow->n_side) {
+            dx = evs_flow_gradient(here[x - 1u], here[x + 1u]);
+            dy = evs_flow_gradient(above[x], below[x]);
+            sample[0] = here[x];
+            x += stride;
+        }
         sample[EVS_FLOW_DX] = (int16_t)dx;
         sample[EVS_FLOW_DY] = (int16_t)dy;
         xx += dx * dx;
         xy += dx * dy;
         yy += dy * dy;
-    }
-    for (; c < flow->n_pitch; c++) {
-        int16_t *const sample = evs_flow_sample(flow, i, c);
-        sample[EVS_FLOW_DX] = 0;
-        sample[EVS_FLOW_DY] = 0;
+        sample += (c % 8u == 7u) ? EVS_FLOW_GROUP - 7 : 1;
     }
     texture->xx += xx;
     texture->xy += xy;
@@ -59,17 +59,26 @@ void evs_flow_template_plain(evs_flow_t *flow, evs_flow_place_t at, evs_flow_tex
     }
 }
 
+/* How many of the eight samples from c on there are, of n. */
+static size_t in_group(size_t c, size_t n) { return (n - c < 8u) ? n - c : 8u; }
+
 void evs_flow_pull_plain(const evs_flow_t *flow, evs_flow_place_t at, evs_flow_pull_t *pull)
 {
     const size_t stride = flow->cfg.stride_px;
+    const int16_t *group = flow->samples;
     *pull = (evs_flow_pull_t){0, 0};
     for (size_t i = 0u; i < flow->n_side; i++) {
+        const uint8_t *px = at.px;
         int32_t x = 0, y = 0; /* at most 31 * 255 * 32640 < 2^28 */
-        for (size_t c = 0u; c < flow->n_side; c++) {
-            const int16_t *const sample = evs_flow_sample(flow, i, c);
-            const int32_t difference = evs_flow_blend(at.px + c * stride, &at) - sample[0];
-            x += sample[EVS_FLOW_DX] * difference;
-            y += sample[EVS_FLOW_DY] * difference;
+        for (size_t c = 0u; c < flow->n_side; c += 8u) {
+            const int16_t *const end = group + in_group(c, flow->n_side);
+            for (const int16_t *sample = group; sample != end; sample++) {
+                const int32_t difference = evs_flow_blend(px, &at) - sample[0];
+                x += sample[EVS_FLOW_DX] * difference;
+                y += sample[EVS_FLOW_DY] * difference;
+                px += stride;
+            }
+            group += EVS_FLOW_GROUP;
         }
         pull->x += x;
         pull->y += y;
@@ -80,11 +89,17 @@ void evs_flow_pull_plain(const evs_flow_t *flow, evs_flow_place_t at, evs_flow_p
 uint32_t evs_flow_difference_plain(const evs_flow_t *flow, evs_flow_place_t at)
 {
     const size_t stride = flow->cfg.stride_px;
+    const int16_t *group = flow->samples;
     uint32_t sum = 0u;
     for (size_t i = 0u; i < flow->n_side; i++) {
-        for (size_t c = 0u; c < flow->n_side; c++) {
-            const int32_t grey = *evs_flow_sample(flow, i, c);
-            sum += evs_abs_u32(evs_flow_blend(at.px + c * stride, &at) - grey);
+        const uint8_t *px = at.px;
+        for (size_t c = 0u; c < flow->n_side; c += 8u) {
+            const int16_t *const end = group + in_group(c, flow->n_side);
+            for (const int16_t *sample = group; sample != end; sample++) {
+                sum += evs_abs_u32(evs_flow_blend(px, &at) - sample[0]);
+                px += stride;
+            }
+            group += EVS_FLOW_GROUP;
         }
         at.px += stride * at.pitch;
     }
