@@ -17,6 +17,7 @@ set(EVS_SOURCES
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_egomotion_search.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_fixed.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow_dsp.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow_grid.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow_plain.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow_sse2.c
