@@ -56,6 +56,10 @@ enum {
 /* bench_flow.c */
 enum { BENCH_TRACKS = 128 };
 
-enum { BENCH_CORNERS = 0, BENCH_TRACK_ALL = 1, BENCH_IMAGE_PAIR = 2 };
+enum {
+    BENCH_CORNERS = 0,
+    BENCH_TRACK_ALL = 1,
+    BENCH_IMAGE_PAIR = 2,
+};
 
 #endif

@@ -61,7 +61,6 @@ PER_UPDATE = [
     ("attitude: 6D, at rest, bias being learnt", "REST_6D"),
     ("attitude: 9D, at rest, bias being learnt", "REST_9D"),
 ]
-
 PER_IMAGE = [  # (row, region, how many there are in it)
     ("corners of an image of 240×180", "CORNERS", "ONE"),
     ("flow: a corner tracked, 31 px, every 2nd, 2 levels, there and back", "TRACK_ALL", "TRACKS"),
