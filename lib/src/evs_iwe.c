@@ -47,7 +47,8 @@ evs_status_t evs_iwe_init(evs_iwe_t *iwe, const evs_iwe_config_t *cfg, void *mem
     if (!config_ok(cfg) || (((uintptr_t)memory % sizeof(uint32_t)) != 0u)) { return EVS_ERR_ARG; }
     if (n_bytes < EVS_IWE_BYTES(cfg->width_px, cfg->height_px, cfg->vote)) { return EVS_ERR_SIZE; }
 
-    *iwe = (evs_iwe_t){.cfg = *cfg, .votes = memory, .row = (uint32_t *)(void *)((uint8_t *)memory + votes_bytes(cfg))};
+    *iwe =
+        (evs_iwe_t){.cfg = *cfg, .votes = memory, .rows = (uint32_t *)(void *)((uint8_t *)memory + votes_bytes(cfg))};
     evs_iwe_clear(iwe);
     return EVS_OK;
 }

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { W = 37, H = 23, N_POINTS = 1500, GUARD = 0xA5 };
+enum { W = 37, H = 23, N_POINTS = 1200, GUARD = 0xA5 };
 
 static evs_iwe_t iwe;
 static union {
@@ -171,9 +171,12 @@ static void test_gaussian_of_one_event_is_exact_to_its_last_bit(void)
             points[0] = point(x, y);
             evs_iwe_add(&iwe, points, 1u);
             double mass = 0.0;
+            double in_x[9]; /* factors of the equation, for boards that have no exp() in hardware */
+            for (int u = 0; u < 9; u++) { in_x[u] = weight(EVS_IWE_GAUSSIAN, u - x / 16.0, 0.0); }
             for (int v = 0; v < 8; v++) {
+                const double in_y = weight(EVS_IWE_GAUSSIAN, 0.0, v - y / 16.0);
                 for (int u = 0; u < 9; u++) {
-                    const double equation = weight(EVS_IWE_GAUSSIAN, u - x / 16.0, v - y / 16.0);
+                    const double equation = in_x[u] * in_y * 2.0 * MODEL_PI;
                     const double got = memory.halves[v * 9 + u] / 1024.0;
                     mass += got;
                     if ((abs(u - ((x + 8) >> 4)) <= 3) && (abs(v - ((y + 8) >> 4)) <= 3)) {
