@@ -51,3 +51,18 @@ bool evl_track_position(const evh_poses_t *track, int64_t t_us, evl_vec3_t *p_m)
     p_m->z = p[2];
     return true;
 }
+
+size_t evl_track_after(const evh_poses_t *track, int64_t t_us)
+{
+    size_t low = 0u;
+    size_t high = track->n;
+    while (low < high) {
+        const size_t middle = low + (high - low) / 2u;
+        if (track->pose[middle].t_us <= t_us) {
+            low = middle + 1u;
+        } else {
+            high = middle;
+        }
+    }
+    return low;
+}

@@ -21,4 +21,7 @@ bool evl_track_orientation(const evh_poses_t *track, int64_t t_us, evl_quat_t *q
 /** Position, linear. The same rule. */
 bool evl_track_position(const evh_poses_t *track, int64_t t_us, evl_vec3_t *p_m);
 
+/** The first sample later than t_us; track->n when there is none. */
+size_t evl_track_after(const evh_poses_t *track, int64_t t_us);
+
 #endif

@@ -37,7 +37,9 @@ static const evt_usage_t USAGE = {
     .synopsis = "[-o DIR] [options]",
     .about =
         "Simulates a flapping-wing flight through a room ('evstab sim room'), replays its events and IMU samples\n"
-        "('evstab replay'), and tells what stabilization did: the same events are measured with and without it.\n"
+        "('evstab replay'), and tells what stabilization did: the same events are measured with and without it, and "
+        "the\n"
+        "direction of flight is compared with the truth.\n"
         "Writes DIR/flight, the recording, and into DIR what replay writes: report.html to look at, and the files.",
     .examples = "  evstab demo\n"
                 "  evstab demo -o /tmp/demo --duration 6",
@@ -95,6 +97,10 @@ static void print_numbers(const evt_replay_outcome_t *x, const char *flight)
     (void)printf(
         "  rotation   %.3g deg/s removed on average, %.3g at most: a smear of %.3g px in 20 ms, %.3g at most\n",
         n->rate_rad_s * DEG, n->rate_max_rad_s * DEG, n->motion_px_s * SMEAR_S, n->motion_max_px_s * SMEAR_S);
+    if (n->n_directions_true > 0u) {
+        (void)printf("  direction  of flight within %.1f deg of the truth in half of %" PRIu64 " measurements\n",
+                     n->direction_error_deg, n->n_directions_true);
+    }
     (void)printf("  speed      %.3g ns per event in the library: %.3g million events/s on one core\n", ns, 1e3 / ns);
 }
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * SPDX-FileCopyrightText: 2026 the evstab authors */
 /* evstab eval: what a run of evstab replay found, against the truth. */
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,7 +18,7 @@
 
 #define OFFSET_MAX_US INT64_C(1000000000)
 
-#define BASELINE_MS_DEFAULT 20
+#define BASELINE_MS_DEFAULT 40
 
 static const char *opt_truth, *opt_velocity_truth, *opt_json, *opt_align, *opt_offset, *opt_baseline, *opt_from,
     *opt_to;
@@ -39,7 +40,7 @@ static const evt_option_t OPTIONS[] = {
      "by least squares over all samples.",
      &opt_align, NULL},
     {"poses-offset-us", '\0', "N", "t_event = t_pose + N, in microseconds. Default: 0.", &opt_offset, NULL},
-    {"baseline-ms", '\0', "N", "Positions are differentiated over N ms, 2 .. 1000.\nDefault: 20.", &opt_baseline, NULL},
+    {"baseline-ms", '\0', "N", "Positions are differentiated over N ms, 2 .. 1000.\nDefault: 40.", &opt_baseline, NULL},
     {"from", '\0', "S", "First time to compare, in seconds of the events' clock.", &opt_from, NULL},
     {"to", '\0', "S", "Stop before this time.", &opt_to, NULL},
     {"json", '\0', "FILE", "Where the numbers go. Default: RUN/eval.json.", &opt_json, NULL},
@@ -57,7 +58,8 @@ static const evt_usage_t USAGE = {
         "             A heading or world is aligned over one second: the last before the truth starts to turn, if it\n"
         "             rests that long, else the first.\n"
         "  velocity   angle between the directions of velocity.csv and of the truth, in the camera's frame; samples\n"
-        "             slower than 0.25 of the mean true speed are left out.\n"
+        "             slower than 0.25 of the mean true speed are left out. How much of the time is covered, and how\n"
+        "             many errors are as small as the estimates say they are.\n"
         "  sharpness  of events.csv (replay --write events): variance of the picture of events, blurred by 1 px, from\n"
         "             undistorted and from stabilized positions.",
     .examples = "  evstab eval out --truth groundtruth.txt\n"
@@ -119,14 +121,16 @@ static bool settle(evt_eval_t *e, const char *run, int *status)
 
 /* What is in the folder of the run, and what is needed of its summary. */
 typedef struct {
-    char *attitude, *velocity, *events, *windows, *json;
+    char *attitude, *velocity, *pairs, *events, *windows, *json;
     uint16_t width_px, height_px;
+    int64_t t_first_us, t_last_us; /* Of its events; equal when the summary does not tell. */
 } run_t;
 
 static void run_free(run_t *run)
 {
     free(run->attitude);
     free(run->velocity);
+    free(run->pairs);
     free(run->events);
     free(run->windows);
     free(run->json);
@@ -141,11 +145,12 @@ static bool run_open(run_t *run, const char *dir, evt_eval_result_t *x, evh_erro
     memset(run, 0, sizeof *run);
     run->attitude = evh_path_join(dir, "attitude.csv");
     run->velocity = evh_path_join(dir, "velocity.csv");
+    run->pairs = evh_path_join(dir, "pairs.csv");
     run->events = evh_path_join(dir, "events.csv");
     run->windows = evh_path_join(dir, "windows.csv");
     run->json = evh_path_join(dir, "eval.json");
-    if ((summary == NULL) || (run->attitude == NULL) || (run->velocity == NULL) || (run->events == NULL) ||
-        (run->windows == NULL) || (run->json == NULL)) {
+    if ((summary == NULL) || (run->attitude == NULL) || (run->velocity == NULL) || (run->pairs == NULL) ||
+        (run->events == NULL) || (run->windows == NULL) || (run->json == NULL)) {
         free(summary);
         return evh_fail(err, "out of memory");
     }
@@ -163,6 +168,8 @@ static bool run_open(run_t *run, const char *dir, evt_eval_result_t *x, evh_erro
                    evt_json_get_text(root, "settings.attitude", "?"));
     width = evt_json_get_number(root, "settings.camera.width_px", 0.0);
     height = evt_json_get_number(root, "settings.camera.height_px", 0.0);
+    run->t_first_us = llround(1e6 * evt_json_get_number(root, "t_first_s", 0.0));
+    run->t_last_us = llround(1e6 * evt_json_get_number(root, "t_last_s", 0.0));
     cJSON_Delete(root);
     free(summary);
     if (!(width >= 1.0) || !(height >= 1.0) || (width > 65535.0) || (height > 65535.0)) {
@@ -236,6 +243,14 @@ static bool eval_attitude(const evt_eval_t *e, const run_t *run, const evh_poses
     return ok;
 }
 
+/* Of the time that the run and the comparison share. */
+static double coverage(const evt_eval_t *e, const run_t *run, const evl_velocities_t *est)
+{
+    const int64_t from_us = (e->from_us > run->t_first_us) ? e->from_us : run->t_first_us;
+    const int64_t to_us = (e->to_us < run->t_last_us) ? e->to_us : run->t_last_us;
+    return (to_us > from_us) ? evl_velocity_coverage(est, from_us, to_us) : (double)NAN;
+}
+
 static bool eval_velocity(const evt_eval_t *e, const run_t *run, const evh_poses_t *poses, evt_eval_result_t *x,
                           evh_error_t *err)
 {
@@ -253,7 +268,8 @@ static bool eval_velocity(const evt_eval_t *e, const run_t *run, const evh_poses
     x->n_no_estimate = est.tally.n_fault[EVH_FAULT_NOT_FINITE];
     est.tally.n_fault[EVH_FAULT_NOT_FINITE] = 0u; /* No fault of the file. */
     evh_tally_report(&est.tally, "velocity.csv");
-    if (e->velocity_truth != NULL) {
+    if (evh_file_exists(run->pairs)) { ok = evl_velocities_read_intervals(&est, run->pairs, err); }
+    if (ok && (e->velocity_truth != NULL)) {
         ok = evl_velocities_read(&table, e->velocity_truth, err);
         evh_tally_report(&table.tally, evh_path_name(e->velocity_truth));
         truth.table = &table;
@@ -277,6 +293,7 @@ static bool eval_velocity(const evt_eval_t *e, const run_t *run, const evh_poses
         }
     } else {
         x->has_velocity = ok;
+        x->coverage = coverage(e, run, &est);
     }
     evl_velocities_free(&table);
     evl_velocities_free(&est);

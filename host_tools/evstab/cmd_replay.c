@@ -31,7 +31,8 @@ static const evt_option_t OPTIONS[] = {
      "When a window of events closes:\n"
      "area:COLSxROWS:N  a tile of the image has more than N events;\n"
      "count:N           N events; time:US  US microseconds.\n"
-     "Default: area:34x26:200.",
+     "Default: area:34x26:N, N being 36 events per pixel of a\n"
+     "tile, but after 5 ms at the earliest and 50 at the latest.",
      &opt.window, NULL},
     {"rotation", '\0', "MODE",
      "slice: follow the attitude within a window (default);\nwindow: one rotation per window, as the paper.",
@@ -39,6 +40,26 @@ static const evt_option_t OPTIONS[] = {
     {"saccade", '\0', "on|off",
      "Move the reference when the view has turned away by a\nsixth of the image width. Default: on.", &opt.saccade,
      NULL},
+    {"velocity", '\0', "on|off",
+     "Measure the direction of flight, velocity.csv. Default: on\nwhere there are a lens and an attitude.",
+     &opt.velocity, NULL},
+    {"image", '\0', "KIND",
+     "What the direction is measured in:\n"
+     "iwe: image of (warped) events, smoothed (default);\n"
+     "surface: time surface; count: events per pixel.",
+     &opt.image, NULL},
+    {"warp", '\0', "MODE",
+     "How events move along the flow before they are drawn:\n"
+     "none (default); predicted: by the flow of the pair of\n"
+     "images before; global, tiled: by the flow that makes the\n"
+     "image sharpest, one or per tile.",
+     &opt.warp, NULL},
+    {"method", '\0', "METHOD",
+     "From flow to direction: erlv (default); erlv-paper, as\npublished; erl: also for a rotation that is unknown.",
+     &opt.method, NULL},
+    {"baseline-ms", '\0', "MIN:MAX",
+     "How far apart the two images of a pair may lie; within it\nas far as makes 4 px of flow. Default: 30:250.",
+     &opt.baseline, NULL},
     {"calib", '\0', "FILE", "Camera: fx fy cx cy k1 k2 p1 p2 k3, or YAML.", &opt.calib, NULL},
     {"imu", '\0', "FILE", "IMU samples: t ax ay az gx gy gz in text, or CSV\nwith a header.", &opt.imu, NULL},
     {"imu-order", '\0', "ORDER",
@@ -51,16 +72,20 @@ static const evt_option_t OPTIONS[] = {
     {"config", '\0', "FILE.yaml",
      "Camera, extrinsics and window with the paper's names:\n"
      "K D fisheye_distortion q_external accumulation_type\n"
-     "roi_threshold number_of_columns number_of_rows ...",
+     "roi_threshold number_of_columns number_of_rows ...\n"
+     "and ours: image warp velocity method.",
      &opt.config, NULL},
     {"size", '\0', "WxH", "Sensor size in pixels. Default: what the YAML file says,\nelse 240x180.", &opt.size, NULL},
     {"paper", '\0', NULL,
      "The published settings: one rotation per window, 34x26\ntiles, threshold 200, 50 or 500 by sensor, saccade at "
-     "W/6.",
+     "W/6,\ntiled warp, Gaussian votes, method erlv-paper.",
      NULL, &opt.paper},
     {"from", '\0', "S", "First time to replay, in seconds of the recording's clock.", &opt.from, NULL},
     {"to", '\0', "S", "Stop before this time.", &opt.to, NULL},
-    {"write", '\0', "events", "Also write events.csv, a row per event.", &opt.write, NULL},
+    {"write", '\0', "WHAT",
+     "events: also events.csv, a row per event;\nframes: also frames/*.png, the image of each window;\nor both: "
+     "events,frames.",
+     &opt.write, NULL},
     {"video", '\0', "FILE",
      "Also make a video, .mp4 or .gif, of the events raw,\nstabilized, and on a canvas of twice the size, at half\n"
      "speed. Needs ffmpeg.",
@@ -72,18 +97,21 @@ static const evt_option_t OPTIONS[] = {
 static const evt_usage_t USAGE = {
     .command = "replay",
     .synopsis = "INPUT... -o DIR [options]",
-    .about = "Replays a recording through the library. INPUT is a folder in ECD form (events.txt imu.txt "
-             "groundtruth.txt calib.txt,\n"
-             "each also .gz) or one event file (\"t x y p\" lines); files outside of it are named by options.\n"
-             "Writes into DIR: report.html to look at, summary.json, attitude.csv (world from camera, per sample), "
-             "windows.csv,\n"
-             "and events.csv on demand.\n"
-             "Several INPUTs: each is replayed by a process of its own into DIR/NAME, with what it had to say in "
-             "log.txt;\n"
-             "DIR/summary.csv has a row for each. Exit status 1 if any of them failed.",
+    .about =
+        "Replays a recording through the library. INPUT is a folder in ECD form (events.txt imu.txt "
+        "groundtruth.txt calib.txt,\n"
+        "each also .gz) or one event file (\"t x y p\" lines); files outside of it are named by options.\n"
+        "Writes into DIR: report.html to look at, summary.json, attitude.csv (world from camera, per sample), "
+        "windows.csv,\n"
+        "velocity.csv (direction of flight) and pairs.csv (what each pair of images told); events.csv and frames on "
+        "demand.\n"
+        "Several INPUTs: each is replayed by a process of its own into DIR/NAME, with what it had to say in "
+        "log.txt;\n"
+        "DIR/summary.csv has a row for each. Exit status 1 if any of them failed.",
     .examples = "  evstab replay slider_depth -o out\n"
                 "  evstab replay slider_depth -o out --video out/slider.mp4\n"
                 "  evstab replay events_02.097-02.196.txt --calib calib.txt --imu imu.txt -o out --write events\n"
+                "  evstab replay slider_depth -o out --image surface --write frames\n"
                 "  evstab replay recordings/* -o out -j 4",
     .options = OPTIONS,
     .n_options = sizeof OPTIONS / sizeof OPTIONS[0],
@@ -113,6 +141,11 @@ static void report(const evt_replay_t *r, const evt_replay_options_t *o, const e
     if (r->rec.poses != NULL) { evh_tally_report(&x->poses_tally, evh_path_name(r->rec.poses)); }
     report_unoriented(x);
     evt_note_attitude_faults(&x->attitude_faults);
+    if (r->velocity_told && (x->velocity.n_valid == 0u)) {
+        evh_note("no direction of flight: %" PRIu64 " images, %" PRIu64
+                 " pairs of them; pairs.csv tells what was in the way",
+                 (uint64_t)x->counts.n_images, x->velocity.n_pairs);
+    }
     if (x->n_no_undistorted + x->n_out_of_range > 0u) {
         evh_note("%" PRIu64 " of %" PRIu64 " events have no position: %" PRIu64 " under the lens model, %" PRIu64
                  " rotated out of range",
@@ -122,6 +155,19 @@ static void report(const evt_replay_t *r, const evt_replay_options_t *o, const e
         evh_note("the sensor is taken as %ux%u; --size says otherwise", (unsigned)r->calib.width_px,
                  (unsigned)r->calib.height_px);
     }
+}
+
+static void print_velocity(const evt_replay_t *r, const evt_replay_result_t *x, const evr_numbers_t *n)
+{
+    if (!r->pipeline.velocity_on) { return; }
+    (void)printf("direction of flight from %" PRIu64 " of %" PRIu64 " pairs of images", x->velocity.n_valid,
+                 x->velocity.n_pairs);
+    if (n->n_directions > 0u) { (void)printf(", median uncertainty %.1f deg", n->sigma_deg); }
+    if (n->n_directions_true > 0u) { (void)printf(", median angle to the truth %.1f deg", n->direction_error_deg); }
+    if (x->counts.n_images > 0u) {
+        (void)printf("; %.2f ms per image", 1e-6 * (double)x->velocity_ns / (double)x->counts.n_images);
+    }
+    (void)printf("\n");
 }
 
 static void print_result(const evt_replay_t *r, const evt_replay_options_t *o, const evt_replay_outcome_t *outcome)
@@ -140,8 +186,10 @@ static void print_result(const evt_replay_t *r, const evt_replay_options_t *o, c
         (void)printf("sharpness %.3g raw, %.3g stabilized: x%.2f\n", n->sharpness_before, n->sharpness_after,
                      n->sharpness_after / n->sharpness_before);
     }
-    (void)printf("wrote %s/: %ssummary.json attitude.csv windows.csv%s\n", o->output,
-                 o->no_report ? "" : "report.html ", r->write_events ? " events.csv" : "");
+    print_velocity(r, x, n);
+    (void)printf("wrote %s/: %ssummary.json attitude.csv windows.csv%s%s%s\n", o->output,
+                 o->no_report ? "" : "report.html ", r->pipeline.velocity_on ? " velocity.csv pairs.csv" : "",
+                 r->write_events ? " events.csv" : "", r->write_frames ? " frames/" : "");
     if (o->video != NULL) { (void)printf("wrote %s\n", o->video); }
 }
 

@@ -32,6 +32,7 @@ typedef struct {
     bool has_velocity;
     uint64_t n_no_estimate; /**< Rows of velocity.csv without one. */
     evl_velocity_result_t velocity;
+    double coverage; /**< evl_velocity_coverage() over the run; NaN: its span is not known. */
     bool has_sharpness;
     evl_run_sharpness_t sharpness;
     evl_gain_t per_window, per_100ms;

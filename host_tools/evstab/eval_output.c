@@ -86,20 +86,35 @@ static void print_attitude(FILE *out, const evt_eval_t *e, const evt_eval_result
     print_error(out, "over 1 s", &a->over_1s_deg);
 }
 
+static double percent(size_t part, size_t whole) { return 100.0 * (double)part / (double)whole; }
+
+static void print_angles(FILE *out, const char *name, const evl_stats_t *s)
+{
+    (void)fprintf(out, "  %-14s %9.3f %9.3f %9.3f %9.3f\n", name, s->mean, s->median, s->p95, s->max);
+}
+
 static void print_velocity(FILE *out, const evt_eval_t *e, const evt_eval_result_t *x)
 {
     const evl_velocity_result_t *const v = &x->velocity;
     const bool table = (e->velocity_truth != NULL);
     (void)fprintf(out, "velocity direction against %s", evh_path_name(table ? e->velocity_truth : e->truth));
-    if (!table) { (void)fprintf(out, ", differences over %.0f ms", 1e-3 * (double)e->baseline_us); }
+    if (!table) { (void)fprintf(out, ", fits over %.0f ms", 1e-3 * (double)e->baseline_us); }
     (void)fprintf(out,
                   ": %zu samples\n  left out: %zu slower than %.2f of the mean %.3f m/s, %zu without truth, %" PRIu64
                   " without an estimate\n",
                   v->error_deg.n, v->n_slow, EVL_SLOW_SHARE, v->mean_speed_m_s, v->n_no_truth,
                   x->n_no_estimate + v->n_zero);
     (void)fprintf(out, "  %-14s %9s %9s %9s %9s\n", "error, deg", "mean", "median", "95 %", "max");
-    (void)fprintf(out, "  %-14s %9.3f %9.3f %9.3f %9.3f\n", "direction", v->error_deg.mean, v->error_deg.median,
-                  v->error_deg.p95, v->error_deg.max);
+    print_angles(out, "at its time", &v->error_deg);
+    if (v->interval_error_deg.n > 0u) { print_angles(out, "over interval", &v->interval_error_deg); }
+    if (isfinite(x->coverage)) {
+        (void)fprintf(out, "  an estimate of the last %.1f s was at hand for %.1f %% of the time\n",
+                      1e-6 * EVL_COVER_US, 100.0 * x->coverage);
+    }
+    if (v->n_sigma > 0u) {
+        (void)fprintf(out, "  within 1 sigma of their own: %.1f %% (63 if Gaussian), within 2: %.1f %% (98)\n",
+                      percent(v->n_within_sigma, v->n_sigma), percent(v->n_within_2_sigma, v->n_sigma));
+    }
 }
 
 static void print_gain(FILE *out, const char *name, const evl_gain_t *g)
@@ -191,6 +206,14 @@ static void add_velocity(cJSON *root, const evt_eval_t *e, const evt_eval_result
     evt_json_count(o, "n_no_truth", v->n_no_truth);
     evt_json_count(o, "n_no_estimate", x->n_no_estimate + v->n_zero);
     add_stats(o, "direction", &v->error_deg);
+    if (v->interval_error_deg.n > 0u) { add_stats(o, "direction_over_interval", &v->interval_error_deg); }
+    evt_json_number(o, "covered_share", x->coverage);
+    evt_json_seconds(o, "covered_for_s", EVL_COVER_US);
+    if (v->n_sigma > 0u) {
+        evt_json_count(o, "n_sigma", v->n_sigma);
+        evt_json_number(o, "within_sigma_share", (double)v->n_within_sigma / (double)v->n_sigma);
+        evt_json_number(o, "within_2_sigma_share", (double)v->n_within_2_sigma / (double)v->n_sigma);
+    }
 }
 
 static void add_pictures(cJSON *to, const char *key, const evl_pictures_t *pictures, const evl_gain_t *gain)

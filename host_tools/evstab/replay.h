@@ -27,6 +27,7 @@ typedef struct {
     const char *calib, *imu, *poses, *config;
     const char *size, *imu_order;
     const char *attitude, *window, *rotation, *saccade;
+    const char *image, *warp, *velocity, *method, *baseline;
     const char *imu_offset, *from, *to, *write, *video;
     bool paper, no_report;
 } evt_replay_options_t;
@@ -40,7 +41,8 @@ typedef struct {
     evh_imu_order_t imu_order;
     evs_pipeline_config_t pipeline;
     int64_t from_us, to_us; /**< Events in [from, to). */
-    bool write_events;
+    bool write_events, write_frames;
+    bool velocity_told; /**< Somebody asked for it: a failure must not pass silently. */
 } evt_replay_t;
 
 /**
@@ -51,6 +53,16 @@ bool evt_replay_settle(evt_replay_t *r, const evt_replay_options_t *options, boo
 void evt_replay_free(evt_replay_t *r);
 
 const char *evt_attitude_name(evt_attitude_t attitude);
+
+/** What became of the pairs of images. */
+typedef struct {
+    uint64_t n_pairs, n_valid;
+    uint64_t n_few, n_still, n_unsolved, n_no_orientation;     /**< The others, by the first thing in the way. */
+    uint64_t n_turned;                                         /**< With a saccade between the two images. */
+    uint64_t n_same_time;                                      /**< Replaced by a newer one of the same microsecond. */
+    double flow_sum, inlier_sum, flow_px_sum, interval_us_sum; /**< Over the valid ones. */
+    evs_velocity_counts_t library;
+} evt_replay_velocity_counts_t;
 
 /** What happened, for the summary. */
 typedef struct {
@@ -67,7 +79,10 @@ typedef struct {
     int64_t orientation_first_us, orientation_last_us; /**< By the events' clock. */
     int64_t library_ns;                                /**< In the library, for events. */
     int64_t attitude_ns;                               /**< In the library, for IMU samples or poses. */
+    int64_t velocity_ns;                               /**< In the library, for pairs of images. */
     int64_t wall_ns;
+    size_t library_bytes; /**< Context and memory of the pipeline. */
+    evt_replay_velocity_counts_t velocity;
     evh_tally_t events_tally, imu_tally, poses_tally;
     evs_pipeline_counts_t counts;
     evs_attitude_faults_t attitude_faults;

@@ -10,6 +10,7 @@
 #include "orientation_feed.h"
 #include "progress.h"
 #include "replay.h"
+#include "replay_velocity.h"
 #include "to_device.h"
 
 #define BLOCK_EVENTS 8192u
@@ -29,6 +30,9 @@ typedef struct {
     int64_t newest_us; /* Of the newest orientation pushed, by the events' clock. */
     evt_replay_output_t out;
     bool out_open;
+    evt_velocity_log_t velocity;
+    evh_error_t *err; /* Of what fails inside a pull. */
+    bool failed;
     evt_progress_t progress;
     evs_event_t ev[BLOCK_EVENTS];
     int64_t t_us[BLOCK_EVENTS];
@@ -46,6 +50,7 @@ static bool open_pipeline(run_t *run, evh_error_t *err)
     const size_t bytes = evs_pipeline_bytes(cfg);
     evs_status_t status;
     if (bytes == 0u) { return evh_fail(err, "the library refuses these settings; check sensor size and tiles"); }
+    run->result->library_bytes = sizeof run->pipeline + bytes;
     run->memory = malloc(bytes);
     run->inside_cap = cfg->n_fifo + 1u;
     run->inside_us = malloc(run->inside_cap * sizeof *run->inside_us);
@@ -160,6 +165,19 @@ static void take_chunk(run_t *run, const evs_pipeline_chunk_t *chunk)
         run->window_empty = true;
         run->result->n_windows++;
         run->result->n_saccades += chunk->saccade ? 1u : 0u;
+        if (!evt_velocity_log_window(&run->velocity, chunk, run->window_last_us, run->err)) { run->failed = true; }
+    }
+}
+
+/* All of the work on an image at once, so that none is left out. */
+static void work_on_image(run_t *run)
+{
+    while (evs_pipeline_velocity_busy(&run->pipeline)) {
+        evs_velocity_result_t pair;
+        const int64_t start_ns = evt_now_ns();
+        const bool got = evs_pipeline_velocity(&run->pipeline, SIZE_MAX, &pair);
+        run->result->velocity_ns += evt_now_ns() - start_ns;
+        if (got && !evt_velocity_log_pair(&run->velocity, &run->pipeline, &pair, run->err)) { run->failed = true; }
     }
 }
 
@@ -172,6 +190,7 @@ static void pull_all(run_t *run)
         run->result->library_ns += evt_now_ns() - start_ns;
         if (!got) { return; }
         take_chunk(run, &chunk);
+        work_on_image(run);
     }
 }
 
@@ -208,7 +227,7 @@ static bool run_block(run_t *run, size_t n, evh_error_t *err)
         push_events(run, run->ev + i, run->t_us + i, end - i);
         i = end;
     }
-    return true;
+    return !run->failed;
 }
 
 static bool run_all(run_t *run, size_t n_first, evh_error_t *err)
@@ -231,7 +250,7 @@ static bool run_all(run_t *run, size_t n_first, evh_error_t *err)
         return evh_fail(
             err, "no event has an undistorted position under this lens model; check the distortion coefficients");
     }
-    return ok && (n == 0);
+    return ok && !run->failed && (n == 0);
 }
 
 static bool no_event(const run_t *run, evh_error_t *err)
@@ -261,7 +280,10 @@ static bool start_and_run(run_t *run, const char *dir, evh_error_t *err)
     if (n <= 0) { return (n < 0) ? false : no_event(run, err); }
     if (!evh_make_folder(dir, err)) { return false; }
     run->out_open = true;
-    if (!evt_replay_output_open(&run->out, r, dir, err)) { return false; }
+    if (!evt_replay_output_open(&run->out, r, dir, err) ||
+        !evt_velocity_log_open(&run->velocity, r, dir, run->watch.report, &run->result->velocity, err)) {
+        return false;
+    }
     return run_all(run, (size_t)n, err);
 }
 
@@ -277,18 +299,24 @@ bool evt_replay_run(const evt_replay_t *r, const char *dir, const evt_replay_wat
     run->watch = *watch;
     run->result = result;
     run->newest_us = INT64_MIN;
+    run->err = err;
     run->window_empty = true;
     evt_progress_start(&run->progress);
     ok = start_and_run(run, dir, err);
     evt_progress_end(&run->progress);
-    if (run->out_open) { ok = evt_replay_output_close(&run->out, err) && ok; }
+    if (run->out_open) {
+        ok = evt_replay_output_close(&run->out, err) && ok;
+        ok = evt_velocity_log_close(&run->velocity, err) && ok;
+    }
     evt_orientation_feed_close(&run->feed, result);
     if (run->source != NULL) {
         result->events_tally = run->source->tally;
         run->source->close(run->source);
     }
     if (result->n_events > 0u) {
+        const evs_velocity_t *const part = evs_pipeline_velocity_part(&run->pipeline);
         result->counts = evs_pipeline_counts(&run->pipeline);
+        if (part != NULL) { result->velocity.library = evs_velocity_counts(part); }
         result->attitude_faults = evs_attitude_faults(evs_pipeline_attitude(&run->pipeline));
     }
     free(run->inside_us);

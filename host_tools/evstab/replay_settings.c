@@ -11,6 +11,7 @@
 #include "lines.h"
 #include "options.h"
 #include "replay.h"
+#include "replay_imaging.h"
 #include "to_device.h"
 
 #define DEFAULT_WIDTH_PX  240u /* The DAVIS240C of the Event Camera Dataset. */
@@ -30,11 +31,19 @@ static const char *const ATTITUDES[] = {[EVT_ATTITUDE_NONE] = "none",
 
 const char *evt_attitude_name(evt_attitude_t attitude) { return ATTITUDES[attitude]; }
 
+/* A window that somebody asked for closes when they said, and not for its length. */
+static void no_limits(evs_window_config_t *w)
+{
+    w->min_duration_us = 0u;
+    w->max_duration_us = EVS_WINDOW_DURATION_MAX_US;
+}
+
 /* "area:34x26:200", "count:30000", "time:10000" */
 static bool parse_window(const char *text, evs_pipeline_config_t *p)
 {
     char size[24];
     int64_t value = 0;
+    no_limits(&p->window);
     if (strncmp(text, "count:", 6u) == 0) {
         if (!evt_parse_int(text + 6, 1, EVS_WINDOW_COUNT_MAX, &value)) { return false; }
         p->window.kind = EVS_WINDOW_COUNT;
@@ -66,6 +75,7 @@ static bool parse_window(const char *text, evs_pipeline_config_t *p)
 static void apply_config_window(const evh_config_t *c, evs_pipeline_config_t *p)
 {
     if (c->has_columns) { p->n_cols = (uint16_t)c->n_columns; }
+    if ((c->window_kind != EVH_WINDOW_UNSET) || c->has_roi_threshold) { no_limits(&p->window); }
     if (c->has_rows) { p->n_rows = (uint16_t)c->n_rows; }
     switch (c->window_kind) {
     case EVH_WINDOW_COUNT:
@@ -102,6 +112,8 @@ static void apply_paper(evs_pipeline_config_t *p, uint16_t width_px, uint16_t he
     p->stabilize.rotation = EVS_ROTATION_WINDOW;
     p->window.kind = EVS_WINDOW_AREA;
     p->window.threshold = PUBLISHED[0].threshold;
+    no_limits(&p->window);
+    evt_imaging_paper(p);
     p->n_cols = 34u;
     p->n_rows = 26u;
     for (size_t i = 0u; i < sizeof PUBLISHED / sizeof PUBLISHED[0]; i++) {
@@ -277,16 +289,25 @@ static bool settle_window(evt_replay_t *r, const evt_replay_options_t *o, const 
 static bool settle_write(evt_replay_t *r, const evt_replay_options_t *o, bool *usage_fault, evh_error_t *err)
 {
     if (o->write == NULL) { return true; }
-    if (strcmp(o->write, "events") != 0) { return usage(usage_fault, err, "--write", o->write, "events"); }
-    r->write_events = true;
-    return true;
+    for (const char *word = o->write;; word++) {
+        const size_t length = strcspn(word, ",");
+        if ((length == 6u) && (memcmp(word, "events", length) == 0)) {
+            r->write_events = true;
+        } else if ((length == 6u) && (memcmp(word, "frames", length) == 0)) {
+            r->write_frames = true;
+        } else {
+            return usage(usage_fault, err, "--write", o->write, "events, frames or events,frames");
+        }
+        word += length;
+        if (*word == '\0') { return true; }
+    }
 }
 
 static void settle_pipeline(evt_replay_t *r, const evh_config_t *config)
 {
     const evs_camera_config_t camera = evt_camera_config(&r->calib, r->calib.width_px, r->calib.height_px);
     evs_pipeline_config_t *const p = &r->pipeline;
-    *p = evs_pipeline_config_default(&camera);
+    *p = evs_pipeline_config_velocity(&camera);
     p->tile_table = true; /* Same numbers, less time. */
     p->n_fifo = N_FIFO;
     p->n_ring = N_RING;
@@ -338,7 +359,8 @@ static bool settle(evt_replay_t *r, const evt_replay_options_t *o, bool *usage_f
     if (!settle_calib(r, o, &config, usage_fault, err)) { return false; }
     settle_pipeline(r, &config);
     return settle_attitude(r, o, &config, usage_fault, err) && settle_times(r, o, usage_fault, err) &&
-           settle_window(r, o, &config, usage_fault, err) && settle_write(r, o, usage_fault, err);
+           settle_window(r, o, &config, usage_fault, err) && settle_write(r, o, usage_fault, err) &&
+           evt_imaging_settle(r, o, &config, r->calib_path != NULL, usage_fault, err);
 }
 
 /* Wrong words are told before missing files: the second attempt shall not fail on them. */
@@ -361,7 +383,8 @@ static bool check_words(const evt_replay_options_t *o, bool *usage_fault, evh_er
     if ((o->saccade != NULL) && !evt_parse_on_off(o->saccade, &on)) {
         return usage(usage_fault, err, "--saccade", o->saccade, "on or off");
     }
-    return settle_times(&dummy, o, usage_fault, err) && settle_write(&dummy, o, usage_fault, err);
+    return settle_times(&dummy, o, usage_fault, err) && settle_write(&dummy, o, usage_fault, err) &&
+           evt_imaging_check_words(o, usage_fault, err);
 }
 
 bool evt_replay_settle(evt_replay_t *r, const evt_replay_options_t *options, bool *usage_fault, evh_error_t *err)

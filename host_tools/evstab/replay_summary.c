@@ -11,6 +11,7 @@
 #include "evs/version.h"
 #include "json.h"
 #include "replay.h"
+#include "replay_imaging.h"
 
 /* A measured number: a few digits that mean something. */
 static void add_measure(cJSON *to, const char *key, double value)
@@ -59,6 +60,24 @@ static void add_window(cJSON *to, const evs_pipeline_config_t *p)
         break;
     }
     evt_json_text(to, "window", text);
+    if (p->window.kind != EVS_WINDOW_DURATION) {
+        const bool unlimited = (p->window.max_duration_us == EVS_WINDOW_DURATION_MAX_US);
+        (void)cJSON_AddNumberToObject(to, "window_min_us", p->window.min_duration_us);
+        (void)cJSON_AddItemToObject(to, "window_max_us",
+                                    unlimited ? cJSON_CreateNull() : cJSON_CreateNumber(p->window.max_duration_us));
+    }
+}
+
+static void add_imaging(cJSON *to, const evs_pipeline_config_t *p)
+{
+    evt_json_text(to, "image", evt_image_name(p->image));
+    evt_json_text(to, "warp", evt_warp_name(p->warp));
+    evt_json_text(to, "velocity", p->velocity_on ? "on" : "off");
+    if (!p->velocity_on) { return; }
+    evt_json_text(to, "method", evt_method_name(p->velocity.egomotion.method));
+    (void)cJSON_AddNumberToObject(to, "baseline_min_us", p->velocity.keyframes.baseline_min_us);
+    (void)cJSON_AddNumberToObject(to, "baseline_max_us", p->velocity.keyframes.baseline_max_us);
+    (void)cJSON_AddNumberToObject(to, "flow_target_px", p->velocity.keyframes.target_px_q4 / 16.0);
 }
 
 static void add_settings(cJSON *root, const evt_replay_t *r, const evt_replay_options_t *o)
@@ -77,6 +96,7 @@ static void add_settings(cJSON *root, const evt_replay_t *r, const evt_replay_op
     evt_json_text(s, "rotation", (p->stabilize.rotation == EVS_ROTATION_WINDOW) ? "window" : "slice");
     (void)cJSON_AddNumberToObject(s, "slice_max_us", p->stabilize.slice_max_us);
     (void)cJSON_AddNumberToObject(s, "saccade_px", p->stabilize.saccade_px_q4 / 16.0);
+    add_imaging(s, p);
     (void)cJSON_AddBoolToObject(s, "paper", o->paper);
     (void)cJSON_AddNumberToObject(s, "imu_offset_us", p->track.offset_us);
     (void)cJSON_AddNumberToObject(s, "table_step_px", p->table_step_px);
@@ -126,6 +146,49 @@ static void add_attitude(cJSON *root, const evt_replay_t *r, const evt_replay_re
     }
 }
 
+static void add_images(cJSON *root, const evt_replay_t *r, const evt_replay_result_t *x)
+{
+    const evs_pipeline_config_t *const p = &r->pipeline;
+    cJSON *images;
+    cJSON *left_out;
+    if (p->image == EVS_PIPELINE_IMAGE_NONE) { return; }
+    images = cJSON_AddObjectToObject(root, "images");
+    evt_json_count(images, "made", x->counts.n_images);
+    left_out = cJSON_AddObjectToObject(images, "left_out");
+    evt_json_count(left_out, "no_orientation_or_cut_off", x->counts.n_images_incomplete);
+    evt_json_count(left_out, "velocity_at_work", x->counts.n_images_busy);
+}
+
+static void add_velocity(cJSON *root, const evt_replay_t *r, const evt_replay_result_t *x)
+{
+    const evt_replay_velocity_counts_t *const c = &x->velocity;
+    const double n = (c->n_valid > 0u) ? (double)c->n_valid : 1.0;
+    cJSON *v;
+    cJSON *invalid;
+    if (!r->pipeline.velocity_on) { return; }
+    v = cJSON_AddObjectToObject(root, "velocity");
+    evt_json_count(v, "pairs", c->n_pairs);
+    evt_json_count(v, "valid", c->n_valid);
+    invalid = cJSON_AddObjectToObject(v, "invalid");
+    evt_json_count(invalid, "few_features", c->n_few);
+    evt_json_count(invalid, "too_little_motion", c->n_still);
+    evt_json_count(invalid, "no_direction_fits", c->n_unsolved);
+    evt_json_count(invalid, "no_orientation", c->n_no_orientation);
+    evt_json_count(v, "same_time", c->n_same_time);
+    evt_json_count(v, "images_without_an_older_one", c->library.n_unpaired);
+    evt_json_count(v, "pairs_across_a_saccade", c->n_turned);
+    if (c->n_valid > 0u) {
+        cJSON *const mean = cJSON_AddObjectToObject(v, "mean");
+        add_measure(mean, "interval_s", 1e-6 * c->interval_us_sum / n);
+        add_measure(mean, "flow_px", c->flow_px_sum / n);
+        add_measure(mean, "flow_vectors", c->flow_sum / n);
+        add_measure(mean, "inliers", c->inlier_sum / n);
+    }
+    if (x->counts.n_images > 0u) {
+        add_measure(v, "library_ns_per_image", (double)x->velocity_ns / (double)x->counts.n_images);
+    }
+}
+
 static void add_all(cJSON *root, const evt_replay_t *r, const evt_replay_options_t *o, const evt_replay_result_t *x,
                     const char *failure)
 {
@@ -141,6 +204,9 @@ static void add_all(cJSON *root, const evt_replay_t *r, const evt_replay_options
     add_attitude(root, r, x);
     evt_json_count(root, "windows", x->n_windows);
     evt_json_count(root, "saccades", x->n_saccades);
+    add_images(root, r, x);
+    add_velocity(root, r, x);
+    evt_json_count(root, "library_memory_bytes", x->library_bytes);
     add_measure(root, "wall_s", (double)x->wall_ns * 1e-9);
     add_measure(root, "ns_per_event", (double)x->wall_ns / n);
     add_measure(root, "library_ns_per_event", (double)x->library_ns / n);

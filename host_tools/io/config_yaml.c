@@ -146,6 +146,24 @@ static bool set_q_external(parser_t *p, const yaml_node_t *node)
     return true;
 }
 
+/* One of the words, which are listed as the message shall list them: "iwe, surface, count". */
+static bool set_word(parser_t *p, const yaml_node_t *node, const char *key, const char *words,
+                     char out[EVH_CONFIG_WORD_MAX])
+{
+    const char *const text = scalar(node);
+    const size_t n = (text != NULL) ? strlen(text) : 0u;
+    for (const char *word = words; n > 0u; word += 2) {
+        const size_t length = strcspn(word, ",");
+        if ((length == n) && (n < EVH_CONFIG_WORD_MAX) && (memcmp(word, text, n) == 0)) {
+            memcpy(out, text, n + 1u);
+            return true;
+        }
+        word += length;
+        if (*word == '\0') { break; }
+    }
+    return bad(p, node, key, words);
+}
+
 static bool set_window_kind(parser_t *p, const yaml_node_t *node)
 {
     const char *const text = scalar(node);
@@ -266,6 +284,13 @@ static bool take_key(parser_t *p, const char *key, const yaml_node_t *value, boo
     if (strcmp(key, "enable_saccades") == 0) {
         c->has_saccades = true;
         return take_bool(p, value, key, &c->saccades);
+    }
+    if (strcmp(key, "image") == 0) { return set_word(p, value, key, "iwe, surface, count", c->image); }
+    if (strcmp(key, "warp") == 0) { return set_word(p, value, key, "none, global, tiled, predicted", c->warp); }
+    if (strcmp(key, "method") == 0) { return set_word(p, value, key, "erlv, erlv-paper, erl", c->method); }
+    if (strcmp(key, "velocity") == 0) {
+        c->has_velocity = true;
+        return take_bool(p, value, key, &c->velocity);
     }
     if (strcmp(key, "accumulation_type") == 0) { return set_window_kind(p, value); }
     if (strcmp(key, "accumulation_time") == 0) {

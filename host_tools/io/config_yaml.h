@@ -21,6 +21,9 @@ typedef enum {
     EVH_WINDOW_TIME   /**< accumulation_type: time */
 } evh_window_kind_t;
 
+/** Room for a word with its end. */
+#define EVH_CONFIG_WORD_MAX 24
+
 /** What a file said; each value counts only where its has_ flag is set. */
 typedef struct {
     bool has_calib; /**< K or intrinsics were there. The size may be there without. */
@@ -40,6 +43,11 @@ typedef struct {
     int64_t window_time_us;
 
     bool has_saccades, saccades;
+
+    char image[EVH_CONFIG_WORD_MAX]; /**< Ours; "" = not told. The words are those of replay's options. */
+    char warp[EVH_CONFIG_WORD_MAX];
+    char method[EVH_CONFIG_WORD_MAX];
+    bool has_velocity, velocity;
     bool has_from_imu, from_imu; /**< get_orientation_from_imu */
 } evh_config_t;
 

@@ -19,24 +19,25 @@ static const struct {
     const char *name;
     evh_quantity_t quantity;
 } NAMES[] = {
-    {"t_s", EVH_Q_T},       {"t", EVH_Q_T},         {"t_us", EVH_Q_T},      {"t_ns", EVH_Q_T},
-    {"time", EVH_Q_T},      {"timestamp", EVH_Q_T}, {"gx_rad_s", EVH_Q_GX}, {"gy_rad_s", EVH_Q_GY},
-    {"gz_rad_s", EVH_Q_GZ}, {"gx", EVH_Q_GX},       {"gy", EVH_Q_GY},       {"gz", EVH_Q_GZ},
-    {"w_rs_s_x", EVH_Q_GX}, {"w_rs_s_y", EVH_Q_GY}, {"w_rs_s_z", EVH_Q_GZ}, {"ax_m_s2", EVH_Q_AX},
-    {"ay_m_s2", EVH_Q_AY},  {"az_m_s2", EVH_Q_AZ},  {"ax", EVH_Q_AX},       {"ay", EVH_Q_AY},
-    {"az", EVH_Q_AZ},       {"a_rs_s_x", EVH_Q_AX}, {"a_rs_s_y", EVH_Q_AY}, {"a_rs_s_z", EVH_Q_AZ},
-    {"mx_ut", EVH_Q_MX},    {"my_ut", EVH_Q_MY},    {"mz_ut", EVH_Q_MZ},    {"mx", EVH_Q_MX},
-    {"my", EVH_Q_MY},       {"mz", EVH_Q_MZ},       {"px", EVH_Q_PX},       {"py", EVH_Q_PY},
-    {"pz", EVH_Q_PZ},       {"tx", EVH_Q_PX},       {"ty", EVH_Q_PY},       {"tz", EVH_Q_PZ},
-    {"p_rs_r_x", EVH_Q_PX}, {"p_rs_r_y", EVH_Q_PY}, {"p_rs_r_z", EVH_Q_PZ}, {"qw", EVH_Q_QW},
-    {"qx", EVH_Q_QX},       {"qy", EVH_Q_QY},       {"qz", EVH_Q_QZ},       {"q_rs_w", EVH_Q_QW},
-    {"q_rs_x", EVH_Q_QX},   {"q_rs_y", EVH_Q_QY},   {"q_rs_z", EVH_Q_QZ},   {"vx", EVH_Q_VX},
-    {"vy", EVH_Q_VY},       {"vz", EVH_Q_VZ},
+    {"t_s", EVH_Q_T},       {"t", EVH_Q_T},         {"t_us", EVH_Q_T},          {"t_ns", EVH_Q_T},
+    {"time", EVH_Q_T},      {"timestamp", EVH_Q_T}, {"gx_rad_s", EVH_Q_GX},     {"gy_rad_s", EVH_Q_GY},
+    {"gz_rad_s", EVH_Q_GZ}, {"gx", EVH_Q_GX},       {"gy", EVH_Q_GY},           {"gz", EVH_Q_GZ},
+    {"w_rs_s_x", EVH_Q_GX}, {"w_rs_s_y", EVH_Q_GY}, {"w_rs_s_z", EVH_Q_GZ},     {"ax_m_s2", EVH_Q_AX},
+    {"ay_m_s2", EVH_Q_AY},  {"az_m_s2", EVH_Q_AZ},  {"ax", EVH_Q_AX},           {"ay", EVH_Q_AY},
+    {"az", EVH_Q_AZ},       {"a_rs_s_x", EVH_Q_AX}, {"a_rs_s_y", EVH_Q_AY},     {"a_rs_s_z", EVH_Q_AZ},
+    {"mx_ut", EVH_Q_MX},    {"my_ut", EVH_Q_MY},    {"mz_ut", EVH_Q_MZ},        {"mx", EVH_Q_MX},
+    {"my", EVH_Q_MY},       {"mz", EVH_Q_MZ},       {"px", EVH_Q_PX},           {"py", EVH_Q_PY},
+    {"pz", EVH_Q_PZ},       {"tx", EVH_Q_PX},       {"ty", EVH_Q_PY},           {"tz", EVH_Q_PZ},
+    {"p_rs_r_x", EVH_Q_PX}, {"p_rs_r_y", EVH_Q_PY}, {"p_rs_r_z", EVH_Q_PZ},     {"qw", EVH_Q_QW},
+    {"qx", EVH_Q_QX},       {"qy", EVH_Q_QY},       {"qz", EVH_Q_QZ},           {"q_rs_w", EVH_Q_QW},
+    {"q_rs_x", EVH_Q_QX},   {"q_rs_y", EVH_Q_QY},   {"q_rs_z", EVH_Q_QZ},       {"vx", EVH_Q_VX},
+    {"vy", EVH_Q_VY},       {"vz", EVH_Q_VZ},       {"sigma_deg", EVH_Q_SIGMA}, {"interval_s", EVH_Q_SPAN},
 };
 
 static const char *const QUANTITY_NAMES[EVH_Q_COUNT] = {
-    "t_s", "gx_rad_s", "gy_rad_s", "gz_rad_s", "ax_m_s2", "ay_m_s2", "az_m_s2", "mx_ut", "my_ut", "mz_ut",
-    "px",  "py",       "pz",       "qw",       "qx",      "qy",      "qz",      "vx",    "vy",    "vz"};
+    "t_s",   "gx_rad_s", "gy_rad_s", "gz_rad_s", "ax_m_s2",   "ay_m_s2",   "az_m_s2", "mx_ut",
+    "my_ut", "mz_ut",    "px",       "py",       "pz",        "qw",        "qx",      "qy",
+    "qz",    "vx",       "vy",       "vz",       "sigma_deg", "interval_s"};
 
 static bool is_blank(char c) { return (c == ' ') || (c == '\t') || (c == '\r'); }
 static char lower(char c) { return ((c >= 'A') && (c <= 'Z')) ? (char)(c - 'A' + 'a') : c; }

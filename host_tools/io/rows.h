@@ -35,7 +35,9 @@ typedef enum {
     EVH_Q_QZ,
     EVH_Q_VX,
     EVH_Q_VY,
-    EVH_Q_VZ, /**< m/s, or a direction */
+    EVH_Q_VZ,    /**< m/s, or a direction */
+    EVH_Q_SIGMA, /**< deg: of a direction */
+    EVH_Q_SPAN,  /**< s: the interval that a row stands for */
     EVH_Q_COUNT,
     EVH_Q_SKIP = EVH_Q_COUNT /**< A column that nobody reads. */
 } evh_quantity_t;

@@ -13,6 +13,7 @@ extern const char evr_asset_report_css[];
 extern const char evr_asset_page_js[];
 extern const char evr_asset_before_after_js[];
 extern const char evr_asset_animation_js[];
+extern const char evr_asset_flight_js[];
 extern const char evr_asset_plots_js[];
 extern const char evr_asset_tables_js[];
 extern const char evr_asset_evaluation_js[];

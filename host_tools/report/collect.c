@@ -30,6 +30,7 @@ evr_report_t *evr_report_open(uint16_t width_px, uint16_t height_px, double foca
     evr_series_clear(&r->window_gain);
     r->credit = (double)width_px * height_px;
     if (!evr_spans_open(&r->spans, width_px, height_px) || !evr_clip_open(&r->clip, width_px, height_px) ||
+        !evr_flight_open(&r->flight, width_px, height_px) ||
         !evl_sharpness_open(&r->window_before, width_px, height_px) ||
         !evl_sharpness_open(&r->window_after, width_px, height_px)) {
         evr_report_close(r);
@@ -43,6 +44,7 @@ void evr_report_close(evr_report_t *r)
     if (r == NULL) { return; }
     evr_spans_close(&r->spans);
     evr_clip_close(&r->clip);
+    evr_flight_close(&r->flight);
     evl_sharpness_close(&r->window_before);
     evl_sharpness_close(&r->window_after);
     free(r);
@@ -166,9 +168,16 @@ void evr_report_chunk(evr_report_t *r, const evs_pipeline_chunk_t *c, const int6
     if (c->end.reason != EVS_WINDOW_OPEN) { end_window(r, window_first_us, window_last_us); }
 }
 
+void evr_report_direction(evr_report_t *r, const evr_direction_t *d) { evr_flight_add(&r->flight, d, r->first_us); }
+
+void evr_report_flow(evr_report_t *r, const evr_flow_t *flow)
+{
+    evr_flight_add_flow(&r->flight, flow, (size_t)r->width_px * r->height_px);
+}
+
 evr_numbers_t evr_report_finish(evr_report_t *r)
 {
-    evr_numbers_t x = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+    evr_numbers_t x = {0};
     evr_spans_finish(&r->spans, &r->shake);
     r->take = evr_clip_finish(&r->clip, &r->shake);
     if (r->spans.n_spans > 0u) {
@@ -179,5 +188,9 @@ evr_numbers_t evr_report_finish(evr_report_t *r)
     x.rate_max_rad_s = r->spans.all.rate_max_rad_s;
     x.motion_px_s = r->spans.all.motion_px_s;
     x.motion_max_px_s = r->spans.all.motion_max_px_s;
+    x.n_directions = r->flight.sigma_deg.total;
+    x.n_directions_true = r->flight.error_deg.total;
+    x.sigma_deg = evr_angles_median(&r->flight.sigma_deg);
+    x.direction_error_deg = evr_angles_median(&r->flight.error_deg);
     return x;
 }

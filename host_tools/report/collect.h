@@ -8,6 +8,7 @@
 #define EVR_COLLECT_H
 
 #include "clip.h"
+#include "direction.h"
 #include "report.h"
 #include "series.h"
 #include "shake.h"
@@ -25,6 +26,7 @@ struct evr_report {
     evr_spans_t spans;
     evr_clip_t clip;
     const evr_take_t *take;
+    evr_flight_t flight;
 
     bool turning;   /**< There are orientations at all. */
     bool has_start; /**< There is an orientation that the others are relative to. */

@@ -7,7 +7,7 @@ plots();
 evaluation();
 eventTable();
 settingsTable();
-Promise.all([beforeAndAfter(), animation()]).then(() => {
+Promise.all([beforeAndAfter(), animation(), flight()]).then(() => {
   apply();
   status.resources = performance.getEntriesByType("resource").filter((r) => !r.name.startsWith("data:")).length;
   status.ready = true;

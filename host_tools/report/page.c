@@ -60,6 +60,24 @@ static void put_rates(evr_text_t *t, const evr_counts_t *c, int64_t last_us)
     evr_put(t, "]");
 }
 
+/* Half the widths of the band around the same points, in the same order. */
+static void put_spreads(evr_text_t *t, const evr_series_t *s, int64_t last_us)
+{
+    const char *comma = "";
+    evr_put(t, "[");
+    for (size_t i = 0u; i < EVR_SERIES_BINS; i++) {
+        evr_sample_t sample[2];
+        const size_t n = evr_series_samples(&s->bin[i], sample);
+        for (size_t k = 0u; k < n; k++) {
+            if (sample[k].t_us > last_us) { continue; }
+            evr_put(t, comma);
+            evr_put_number(t, sample[k].spread, 3);
+            comma = ",";
+        }
+    }
+    evr_put(t, "]");
+}
+
 static bool has_samples(const evr_series_t *s)
 {
     for (size_t i = 0u; i < EVR_SERIES_BINS; i++) {
@@ -83,6 +101,25 @@ static void put_axes(evr_text_t *t, const evr_series_t s[3], int64_t last_us, co
     evr_put(t, "]}");
 }
 
+/* Unit vectors with the band of their uncertainty, and the truth where it is known. */
+static void put_direction(evr_text_t *t, const evr_flight_t *f, int64_t last_us)
+{
+    static const char *const NAME[3] = {"x (right)", "y (down)", "z (ahead)"};
+    begin_plot(t, ",", "direction", "Direction of flight in the camera's frame", "unit vector");
+    for (int i = 0; i < 3; i++) {
+        evr_printf(t, "%s{\"name\":\"%s\",\"points\":", (i > 0) ? "," : "", NAME[i]);
+        put_points(t, &f->component[i], last_us);
+        evr_put(t, ",\"spread\":");
+        put_spreads(t, &f->component[i], last_us);
+        if (has_samples(&f->truth[i])) {
+            evr_put(t, ",\"truth\":");
+            put_points(t, &f->truth[i], last_us);
+        }
+        evr_put(t, "}");
+    }
+    evr_put(t, "],\"base\":0}");
+}
+
 /* A plot that has nothing to show is not there. */
 static void put_plots(evr_text_t *t, const evr_report_t *r)
 {
@@ -101,6 +138,7 @@ static void put_plots(evr_text_t *t, const evr_report_t *r)
     evr_put(t, "{\"name\":\"events\",\"fill\":true,\"points\":");
     put_rates(t, &r->events, last_us);
     evr_put(t, "}]}");
+    if (has_samples(&r->flight.component[0])) { put_direction(t, &r->flight, last_us); }
     if (has_samples(&r->window_ms)) {
         begin_plot(t, ",", "window", "Duration of the windows", "ms");
         evr_put(t, "{\"name\":\"window\",\"points\":");
@@ -201,6 +239,25 @@ static void put_clip(evr_text_t *t, const evr_report_t *r)
     free(sheet);
 }
 
+static void put_flow(evr_text_t *t, const evr_report_t *r)
+{
+    const evr_flow_t *const f = &r->flight.best;
+    evr_printf(t, "{\"width\":%u,\"height\":%u,\"at_s\":", (unsigned)r->width_px, (unsigned)r->height_px);
+    put_seconds(t, f->t_us - r->first_us);
+    evr_put(t, ",\"interval_s\":");
+    put_seconds(t, f->interval_us);
+    evr_printf(t, ",\"k\":[%.6g,%.6g,%.6g,%.6g],\"v\":[%.5f,%.5f,%.5f],\"sigma_deg\":%.4g", f->fx_px, f->fy_px,
+               f->cx_px, f->cy_px, f->v[0], f->v[1], f->v[2], f->sigma_rad * 57.29577951308232);
+    evr_put(t, ",\"arrows\":[");
+    for (size_t i = 0u; i < f->n; i++) {
+        const evr_arrow_t *const a = &f->arrows[i];
+        evr_printf(t, "%s%.2f,%.2f,%.2f,%.2f,%d", (i > 0u) ? "," : "", a->x, a->y, a->dx, a->dy, a->inlier ? 1 : 0);
+    }
+    evr_put(t, "],\n\"image\":");
+    put_png(t, f->px, r->width_px, r->height_px, 8);
+    evr_put(t, "}");
+}
+
 static void put_numbers(evr_text_t *t, const evr_report_t *r)
 {
     const evr_spans_t *const s = &r->spans;
@@ -213,6 +270,14 @@ static void put_numbers(evr_text_t *t, const evr_report_t *r)
     if (s->all.n > 0u) {
         evr_printf(t, ",\"rate_deg_s\":[%.5g,%.5g],\"motion_px_s\":[%.5g,%.5g]", s->all.rate_rad_s * 57.29577951308232,
                    s->all.rate_max_rad_s * 57.29577951308232, s->all.motion_px_s, s->all.motion_max_px_s);
+    }
+    evr_printf(t, ",\"directions\":%" PRIu64 ",\"directions_true\":%" PRIu64, r->flight.sigma_deg.total,
+               r->flight.error_deg.total);
+    if (r->flight.sigma_deg.total > 0u) {
+        evr_printf(t, ",\"direction_sigma_deg\":%.4g", evr_angles_median(&r->flight.sigma_deg));
+    }
+    if (r->flight.error_deg.total > 0u) {
+        evr_printf(t, ",\"direction_error_deg\":%.4g", evr_angles_median(&r->flight.error_deg));
     }
     evr_put(t, "}");
 }
@@ -237,6 +302,10 @@ static void put_data(evr_text_t *t, const evr_report_t *r, const char *name, con
         evr_put(t, ",\n\"clip\":");
         put_clip(t, r);
     }
+    if (r->flight.has_best) {
+        evr_put(t, ",\n\"flow\":");
+        put_flow(t, r);
+    }
     evr_put(t, ",\n\"summary\":");
     evr_put_json_in_html(t, summary);
     evr_put(t, "}");
@@ -244,9 +313,9 @@ static void put_data(evr_text_t *t, const evr_report_t *r, const char *name, con
 
 static void put_script(evr_text_t *t)
 {
-    const char *const parts[] = {evr_asset_page_js,  evr_asset_before_after_js, evr_asset_animation_js,
-                                 evr_asset_plots_js, evr_asset_tables_js,       evr_asset_evaluation_js,
-                                 evr_asset_main_js};
+    const char *const parts[] = {evr_asset_page_js,       evr_asset_before_after_js, evr_asset_animation_js,
+                                 evr_asset_flight_js,     evr_asset_plots_js,        evr_asset_tables_js,
+                                 evr_asset_evaluation_js, evr_asset_main_js};
     for (size_t i = 0u; i < sizeof parts / sizeof parts[0]; i++) { evr_put(t, parts[i]); }
 }
 

@@ -11,7 +11,7 @@ const settings = summary.settings;
 const hasRotation = settings.attitude !== "none" && numbers.rate_deg_s !== undefined;
 
 /* What the page has drawn, for tests and the curious: an element that nobody sees. */
-const status = { ready: false, errors: [], theme: "", plots: {}, pictures: 0, span: {} };
+const status = { ready: false, errors: [], theme: "", plots: {}, pictures: 0, span: {}, flow: {} };
 const tell = () => { $("status").textContent = JSON.stringify(status); };
 const complain = (what) => { status.errors.push(String(what)); tell(); };
 window.addEventListener("error", (e) => complain(e.message));

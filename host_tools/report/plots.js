@@ -17,11 +17,13 @@ function range(plot) {
   let high = -Infinity;
   for (const c of plot.curves) {
     for (let i = 1; i < c.points.length; i += 2) {
-      low = Math.min(low, c.points[i]);
-      high = Math.max(high, c.points[i]);
+      const spread = c.spread ? c.spread[(i - 1) / 2] : 0;
+      low = Math.min(low, c.points[i] - spread);
+      high = Math.max(high, c.points[i] + spread);
     }
   }
   if (plot.base !== undefined) { low = Math.min(low, plot.base); high = Math.max(high, plot.base); }
+  if (plot.curves[0].spread) { [low, high] = [Math.max(low, -1.05), Math.min(high, 1.05)]; } /* Of unit vectors. */
   if (plot.curves[0].fill || plot.id === "window") { low = Math.min(low, 0); }
   if (high - low < 1e-9 * Math.max(1, Math.abs(high))) { low -= 1; high += 1; }
   const margin = 0.05 * (high - low);
@@ -54,6 +56,9 @@ function plotHead(p, classes, values) {
     if (p.curves.length === 1) { key.append(values[i]); return; }
     key.append(make("span", {}, make("i", { class: classes[i] }), c.name + " ", values[i]));
   });
+  if (p.curves[0].truth) {
+    key.append(make("span", {}, make("i", { class: "dashed" }), "truth"));
+  }
   if (p.id === "attitude" && data.saccades.n > 0) {
     key.append(make("span", {}, make("i", { class: "c-mark" }), "saccade"));
   }
@@ -109,19 +114,44 @@ function drawAxes(s, k, p) {
   for (const t of data.saccades.t) { s.append(line(k.x(t), k.top, k.x(t), k.bottom, "saccade")); }
 }
 
+const GAP_S = 0.3; /* Curves of estimates are cut where there is none for so long. */
+
+/* The band of the uncertainty. */
+function drawBand(s, k, c, name) {
+  const inRange = (v) => k.y(Math.min(k.high, Math.max(k.low, v))).toFixed(1);
+  let upper = [];
+  let lower = [];
+  let d = "";
+  const close = () => {
+    if (upper.length > 1) { d += "M" + upper.concat(lower.reverse()).join("L") + "Z"; }
+    upper = [];
+    lower = [];
+  };
+  for (let i = 0; i < c.points.length; i += 2) {
+    if (i > 0 && c.points[i] - c.points[i - 2] > GAP_S) { close(); }
+    const x = k.x(c.points[i]).toFixed(1);
+    upper.push(x + " " + inRange(c.points[i + 1] + c.spread[i / 2]));
+    lower.push(x + " " + inRange(c.points[i + 1] - c.spread[i / 2]));
+  }
+  close();
+  s.append(svg("path", { d, class: "band " + name }));
+}
+
 function drawCurve(s, k, c, name) {
   const places = [];
+  let path = "";
   for (let i = 0; i < c.points.length; i += 2) {
+    const cut = i === 0 || (c.cut && c.points[i] - c.points[i - 2] > GAP_S);
     places.push(k.x(c.points[i]).toFixed(1) + " " + k.y(c.points[i + 1]).toFixed(1));
+    path += (cut ? "M" : "L") + places[places.length - 1];
   }
-  const path = "M" + places.join("L");
   if (c.fill) {
     const ground = k.y(k.low).toFixed(1);
     const [first, last] = [places[0], places[places.length - 1]].map((place) => place.split(" ")[0]);
     s.append(svg("path", { d: `${path}L${last} ${ground}L${first} ${ground}Z`, class: "area " + name }));
   }
   s.append(svg("path", { d: path, class: "curve " + name }));
-  if (places.length > 100) { return; }
+  if (places.length > 100 || c.plain) { return; }
   for (const place of places) { /* Few points are seen one by one. */
     const [cx, cy] = place.split(" ");
     s.append(svg("circle", { cx, cy, r: 2, class: "dot " + name }));
@@ -140,11 +170,15 @@ function plot(p) {
   status.plots[p.id] = p.curves.reduce((n, c) => n + c.points.length / 2, 0);
 
   const draw = () => {
-    const k = scales(p, Math.max(240, Math.floor(box.clientWidth)), p.curves.length > 1 ? 170 : 130);
+    const k = scales(p, Math.max(240, Math.floor(box.clientWidth)), p.curves[0].spread ? 210 : p.curves.length > 1 ? 170 : 130);
     const view = `0 0 ${k.width} ${k.height}`;
     const s = svg("svg", { viewBox: view, height: k.height, role: "img", "aria-label": spoken(p) });
     drawAxes(s, k, p);
-    p.curves.forEach((c, i) => drawCurve(s, k, c, classes[i]));
+    p.curves.forEach((c, i) => { if (c.spread) { drawBand(s, k, c, classes[i]); } });
+    p.curves.forEach((c, i) => {
+      if (c.truth) { drawCurve(s, k, { points: c.truth, plain: true, cut: true }, classes[i] + " truth"); }
+      drawCurve(s, k, c.spread ? { points: c.points, cut: true } : c, classes[i]);
+    });
     const cursor = line(0, k.top, 0, k.bottom, "cursor");
     cursor.setAttribute("visibility", "hidden");
     s.append(cursor);
@@ -176,6 +210,13 @@ function plots() {
   const note = (text) => $("plots").append(make("p", { class: "note" }, text));
   const left = data.saccades.n - data.saccades.t.length;
   if (left > 0) { note(`${count(left)} later saccades are not marked.`); }
+  if (drawn.some((p) => p.id === "direction")) {
+    const truth = numbers.directions_true > 0 ? " The dashed truth is the mean velocity over each interval, from the " +
+      `poses of the recording; the median of ${plural(numbers.directions_true, "angle")} to it is ` +
+      `${digits(numbers.direction_error_deg, 2)}${DEGREES}.` : "";
+    note("Direction of flight: an estimate at the middle of the interval that its flow spans, with a band of one " +
+      "standard deviation." + truth);
+  }
   if (numbers.windows_measured < numbers.windows) {
     note(`The sharpness of ${count(numbers.windows_measured)} of ${count(numbers.windows)} windows was measured: ` +
       "of all would take longer than the replay itself.");

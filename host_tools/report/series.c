@@ -29,9 +29,11 @@ static void halve(evr_series_t *s)
     s->width_us *= 2;
 }
 
-void evr_series_put(evr_series_t *s, int64_t t_us, double value)
+void evr_series_put(evr_series_t *s, int64_t t_us, double value) { evr_series_put_spread(s, t_us, value, 0.0); }
+
+void evr_series_put_spread(evr_series_t *s, int64_t t_us, double value, double spread)
 {
-    const evr_bin_t one = {{t_us, value}, {t_us, value}, 1u};
+    const evr_bin_t one = {{t_us, value, spread}, {t_us, value, spread}, 1u};
     if (t_us < 0) { return; }
     while (t_us / s->width_us >= (int64_t)EVR_SERIES_BINS) { halve(s); }
     merge(&s->bin[t_us / s->width_us], &one);

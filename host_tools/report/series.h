@@ -20,6 +20,7 @@
 typedef struct {
     int64_t t_us; /**< Since the start. */
     double value;
+    double spread; /**< Half the width of the band around it; 0 = none. */
 } evr_sample_t;
 
 typedef struct {
@@ -36,6 +37,7 @@ void evr_series_clear(evr_series_t *s);
 
 /** @param t_us  Since the start, in any order; a negative one is ignored. */
 void evr_series_put(evr_series_t *s, int64_t t_us, double value);
+void evr_series_put_spread(evr_series_t *s, int64_t t_us, double value, double spread);
 
 /** The samples kept of one bin in the order of time: 0, 1 or 2 of them. */
 size_t evr_series_samples(const evr_bin_t *bin, evr_sample_t out[2]);

@@ -30,6 +30,13 @@ function cards() {
   } else {
     card("Rotation removed", "none", "", "no orientation was given: the events are only undistorted");
   }
+  if (numbers.directions > 0) {
+    const known = numbers.directions_true > 0;
+    const angle = known ? numbers.direction_error_deg : numbers.direction_sigma_deg;
+    const per_s = digits(numbers.directions / Math.max(data.duration_s, 1e-6), 2);
+    card("Direction of flight", (known ? "" : "\u00b1") + digits(angle, 2), DEGREES,
+      `${known ? "median angle to the truth" : "median uncertainty of its own"}, ${per_s} estimates/s`);
+  }
   const ns = summary.library_ns_per_event;
   card("Time in the library", digits(ns, 3), "ns/event", short(1e9 / ns) + " events/s on one core");
 }
@@ -69,6 +76,24 @@ function orientationText() {
   return `Orientation: ${count(a.samples)} samples, ${text}.`;
 }
 
+/* How the images fared. */
+const INVALID = {
+  few_features: "with too few features", too_little_motion: "with too little motion",
+  no_direction_fits: "whose flow fits no direction", no_orientation: "without an orientation in the middle",
+};
+function imageText() {
+  const images = summary.images;
+  const v = summary.velocity;
+  if (!images) { return ""; }
+  let text = ` Images: ${count(images.made)}`;
+  const lost = Object.values(images.left_out).reduce((a, b) => a + b, 0);
+  if (lost > 0) { text += `, and ${plural(lost, "window")} without one`; }
+  if (!v) { return text + "."; }
+  text += `; ${count(v.valid)} of ${plural(v.pairs, "pair")} of them gave a direction of flight`;
+  const why = Object.entries(v.invalid).filter((e) => e[1] > 0).map(([key, n]) => `${count(n)} ${INVALID[key] || plain(key)}`);
+  return text + (why.length > 0 ? " (not: " + why.join(", ") + ")." : ".");
+}
+
 function eventTable() {
   const e = summary.events;
   const rows = [["read from the file", e.in, false]];
@@ -88,7 +113,8 @@ function eventTable() {
   }
   $("events").append(table);
   const dropped = rows.some((r) => r[2]);
-  $("events").append(make("p", { class: "note" }, (dropped ? "" : "Nothing was dropped. ") + orientationText()));
+  $("events").append(make("p", { class: "note" }, (dropped ? "" : "Nothing was dropped. ") + orientationText() +
+    imageText()));
   status.events = rows.length;
 }
 
@@ -104,7 +130,9 @@ function settingsTable() {
   row("lens", `${c.model}, focal length ${fx} ${TIMES} ${fy} px, centre ${cx}, ${cy} px, distortion ` +
     c.distortion.map((v) => digits(v, 4)).join(", "));
   row("time of the replay", `${seconds(summary.wall_s)}, ${digits(summary.ns_per_event, 3)} ns/event with all files, ` +
-    `${digits(summary.library_ns_per_event, 3)} ns/event in the library`);
+    `${digits(summary.library_ns_per_event, 3)} ns/event in the library` +
+    (summary.velocity && summary.velocity.library_ns_per_image !== undefined ?
+      `, ${digits(summary.velocity.library_ns_per_image * 1e-6, 2)} ms/image for the direction of flight` : ""));
   $("settings").append(table);
   $("footer").textContent = "Written by evstab " + data.version + ". This page needs no network.";
 }

@@ -74,7 +74,8 @@ def test_processes():
     check("time", all(float(r["ns_per_event"]) > 0 for r in rows))
     for name in ("a", "b", "a_2"):
         files = sorted(p.name for p in (ROOT / "out" / name).iterdir())
-        check(f"files of {name}", files == ["attitude.csv", "log.txt", "report.html", "summary.json", "windows.csv"], files)
+        check(f"files of {name}", files == ["attitude.csv", "log.txt", "pairs.csv", "report.html", "summary.json", "velocity.csv",
+                                            "windows.csv"], files)
     log = (ROOT / "out/a_2/log.txt").read_text()
     check("the log tells all", log.startswith("input: other/a/\n") and "note: attitude: imu" in log and "1000 events" in log, log)
 

@@ -60,9 +60,12 @@ def write(name, text):
     return path
 
 
-def make_run(name, attitude, velocity=None, source="imu"):
+def make_run(name, attitude, velocity=None, source="imu", span=None):
     """A folder as `evstab replay` leaves it; attitude: rows of t, qw, qx, qy, qz."""
-    write(f"{name}/summary.json", json.dumps({"settings": {"attitude": source, "camera": {"width_px": 240, "height_px": 180}}}))
+    summary = {"settings": {"attitude": source, "camera": {"width_px": 240, "height_px": 180}}}
+    if span is not None:
+        summary.update(t_first_s=span[0], t_last_s=span[1])
+    write(f"{name}/summary.json", json.dumps(summary))
     rows = "".join(f"{t:.6f},{w:.9f},{x:.9f},{y:.9f},{z:.9f},0,0,0,0\n" for t, w, x, y, z in attitude)
     write(f"{name}/attitude.csv", "#t_s,qw,qx,qy,qz,wx_rad_s,wy_rad_s,wz_rad_s,flags\n" + rows)
     if velocity is not None:
@@ -151,6 +154,8 @@ def test_hand():
     close("inclination RMSE", a["inclination"]["rmse_deg"], math.sqrt(16 / 4))
     check("nothing over 0.1 s", a["over_100ms"]["n"] == 0 and a["over_1s"]["n"] == 0)
     v = e["velocity"]
+    check("coverage of a run that does not tell its span", v["covered_share"] is None, v)
+    close("within sigma: one of three", v["within_sigma_share"], 1 / 3)
     check("velocity counts", (v["direction"]["n"], v["n_no_estimate"], v["n_no_truth"], v["n_slow"]) == (3, 1, 1, 0), v)
     close("velocity mean", v["direction"]["mean_deg"], 50)
     close("velocity median", v["direction"]["median_deg"], 60)
@@ -277,8 +282,9 @@ def test_numpy():
 
     v_t = np.round(np.arange(0.9, 11.5, 0.031), 6)
     v = rng.normal(0, 1, (len(v_t), 3))
-    velocity = "".join(f"{a:.6f},{b[0]:.9f},{b[1]:.9f},{b[2]:.9f},1,9,9\n" for a, b in zip(v_t, v))
-    run_name = make_run("run", [(a, *b) for a, b in zip(t, q)], velocity)
+    velocity = "".join(f"{a:.6f},{b[0]:.9f},{b[1]:.9f},{b[2]:.9f},{(1, 60, 130)[i % 3]},9,9\n"
+                       for i, (a, b) in enumerate(zip(v_t, v)))
+    run_name = make_run("run", [(a, *b) for a, b in zip(t, q)], velocity, span=(0.8, 11.9))
 
     e = evaluate(run_name, "--truth", truth, "--baseline-ms", "40")
     check("heading at rest", e["attitude"]["aligned"]["at_rest"] is True)
@@ -289,7 +295,16 @@ def test_numpy():
         out[np.isnan(slerp_at(np, m, times, ref_t, ref_q)[:, 0])] = np.nan
         return out
 
-    world = (position_at(np.round(v_t + 0.02, 6)) - position_at(np.round(v_t - 0.02, 6))) / 0.04
+    # By numpy's least squares: a parabola through the samples within the baseline and its two interpolated ends.
+    ends = [np.round(v_t + sign * 0.02, 6) for sign in (-1, 1)]
+    at_ends = [position_at(times) for times in ends]
+    world = np.full((len(v_t), 3), np.nan)
+    for i, time in enumerate(v_t):
+        within = (ref_t > ends[0][i] + 1e-9) & (ref_t < ends[1][i] - 1e-9)
+        times = np.concatenate([[ends[0][i]], ref_t[within], [ends[1][i]]]) - time
+        points = np.vstack([at_ends[0][i], np.round(position(ref_t[within]), 9), at_ends[1][i]])
+        if np.isfinite(points).all():
+            world[i] = np.linalg.lstsq(np.vander(times, 3), points, rcond=None)[0][1]
     orientation = slerp_at(np, m, v_t, ref_t, ref_q)
     true = np.einsum("nji,nj->ni", m.matrix(orientation), world)
     known = np.isfinite(true[:, 0])
@@ -301,6 +316,17 @@ def test_numpy():
           f"{int((~known).sum())} without truth, {int((~fast).sum())} slow")
     check("velocity: both happen", (~known).any() and (~fast).any())
     check_stats(np, "velocity", e["velocity"]["direction"], error[fast], 1e-4)
+
+    # Uncertainty and coverage: the sigmas of the rows cycle through three values.
+    sigma = np.array([1.0, 60.0, 130.0])[np.arange(len(v_t)) % 3][known][fast]
+    close("within sigma", e["velocity"]["within_sigma_share"], float((error[fast] <= sigma).mean()), 1e-8)
+    close("within 2 sigma", e["velocity"]["within_2_sigma_share"], float((error[fast] <= 2 * sigma).mean()), 1e-8)
+    first, last = 0.8, 11.9
+    grid = np.arange(first, last, 1e-5) + 5e-6
+    age = grid - v_t[np.clip(np.searchsorted(v_t, grid, side="right") - 1, 0, None)]
+    close("covered", e["velocity"]["covered_share"], float(((age >= 0) & (age < 0.1)).mean()), 1e-4)
+    part = evaluate(run_name, "--truth", truth, "--from", "11.0")["velocity"]
+    close("covered, of a part", part["covered_share"], float(((age >= 0) & (age < 0.1))[grid >= 11.0].mean()), 1e-4)
 
     # Full alignment: the noise must be all that is left of arbitrary worlds and an arbitrary mounting.
     left, right = m.exponential(np.array([0.4, -0.7, 2.2])), m.exponential(np.array([1.5, 0.3, -0.4]))

@@ -111,7 +111,7 @@ def test_slider(evstab, temp):
     folder = DATA / "ecd" / "slider_depth"
     need(folder / "events.txt", folder / "calib.txt")
     out = temp / "out"
-    summary = replay(evstab, out, folder, "--write", "events")
+    summary = replay(evstab, out, folder, "--window", "area:34x26:200", "--write", "events")
     camera = model.Camera(model.read_table(folder / "calib.txt")[0])
     truth = model.read_table(folder / "events.txt")
     t, pixel, undistorted, stabilized, window = read_events(out)

@@ -99,7 +99,7 @@ def check_page(page, temp, theme, flags, summary):
         curves = 3 if plot in ("attitude", "rate") else 1
         n = status["plots"].get(plot, 0)
         check(f"{theme}: plot {plot}", 2 * curves < n <= 2000 * curves, f"{n} points")
-    check(f"{theme}: evaluation", status["evaluation"] == 25, f"{status['evaluation']} cells")
+    check(f"{theme}: evaluation", status["evaluation"] == 30, f"{status['evaluation']} cells")
     check(f"{theme}: animation", status["pictures"] >= 50, f"{status['pictures']} pictures")
     check(f"{theme}: before and after", status["span"]["before"] > 300 and 100 < status["span"]["after"],
           status["span"])
@@ -180,6 +180,32 @@ def check_evaluation(program, out, temp):
     page.write_text(text, encoding="utf-8")
 
 
+def check_direction(page, temp):
+    """The demo flies somewhere, and knows the truth."""
+    text = page.read_text(encoding="utf-8")
+    data = json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.S)[1])
+    curves = next(plot["curves"] for plot in data["plots"] if plot["id"] == "direction")
+    check("direction: a spread per point, and the truth", all(2 * len(c["spread"]) == len(c["points"]) > 0 and
+                                                              len(c["truth"]) > 0 for c in curves), [len(c["points"]) for c in curves])
+    at = [sum(c["points"][2 * i + 1] ** 2 for c in curves) for i in range(len(curves[0]["spread"]))]
+    check("direction: unit vectors", all(abs(length - 1) < 1e-3 for length in at), at)
+    flow = data["flow"]
+    arrows = [flow["arrows"][i:i + 5] for i in range(0, len(flow["arrows"]), 5)]
+    fits = [a for a in arrows if a[4] == 1]
+    check("flow: arrows", len(fits) >= 20, f"{len(fits)} of {len(arrows)} fit")
+    fx, fy, cx, cy = flow["k"]
+    off = []
+    for x, y, dx, dy, _ in fits:  # By the model: u = rho (x Vz - Vx), rho > 0.
+        x0, y0, u, v = (x - dx - cx) / fx, (y - dy - cy) / fy, dx / fx, dy / fy
+        a, b = x0 * flow["v"][2] - flow["v"][0], y0 * flow["v"][2] - flow["v"][1]
+        off.append(math.degrees(abs(math.atan2(a * v - b * u, a * u + b * v))))
+    check("flow: the arrows point from the focus", sorted(off)[len(off) // 2] < 15, f"median {sorted(off)[len(off) // 2]:.1f} deg off")
+    status, console, _, dom = browse(page, temp)
+    check("flow: drawn", status is not None and not status["errors"] and not console and
+          status["flow"] == {"arrows": len(arrows), "inliers": len(fits)}, (status, console))
+    check("flow: told in words", "The camera flies " in dom and "arrows" in dom)
+
+
 def check_odd_recordings(program, folder, temp):
     """Little to show must not break the page."""
     single = temp / "single.txt"
@@ -228,8 +254,10 @@ def check_demo(program, temp):
     check("demo", done.returncode == 0 and (out / "report.html").exists() and (out / "flight" / "events.txt").exists(),
           done.stderr)
     lines = done.stdout.splitlines()
-    check("demo: three numbers and where to look", len(lines) == 5 and lines[4] == f"look at {out}/report.html" and
-          [line.split()[0] for line in lines[1:4]] == ["sharpness", "rotation", "speed"], done.stdout)
+    check("demo: four numbers and where to look", len(lines) == 6 and lines[5] == f"look at {out}/report.html" and
+          [line.split()[0] for line in lines[1:5]] == ["sharpness", "rotation", "direction", "speed"], done.stdout)
+    angle = re.search(r"within ([0-9.]+) deg of the truth", done.stdout)
+    check("demo: the direction of flight is right", angle is not None and float(angle[1]) < 10, done.stdout)
     gain = re.search(r"x([0-9.]+):", done.stdout)
     check("demo: stabilization shows", gain is not None and float(gain[1]) > 1.3, done.stdout)
 
@@ -262,6 +290,8 @@ def main():
         mean = math.degrees(sum(abs(yaw_rate(i / 1000)) for i in range(int(SECONDS * 1000))) / (SECONDS * 1000))
         check("rotation removed", abs(data["numbers"]["rate_deg_s"][0] - mean) < 0.03 * mean,
               f"{data['numbers']['rate_deg_s'][0]} deg/s, made {mean:.1f}")
+        check("a camera that only turns flies nowhere", summary["velocity"]["pairs"] > 5 and "flow" not in data and
+              summary["velocity"]["valid"] == data["numbers"]["directions"] == 0, summary["velocity"])
         turn = data["plots"][0]["curves"][1]["points"][-1]
         check("attitude", abs(turn - math.degrees(yaw(SECONDS))) < 2.0, f"yaw {turn} deg at the end")
         done = evstab(program, "replay", folder, "-o", temp / "bare", "--no-report")
@@ -276,6 +306,7 @@ def main():
         check_page(page, temp, "dark", ["--blink-settings=preferredColorScheme=0"], summary)
         check_hands(page, temp)
         check_odd_recordings(program, folder, temp)
+        check_direction(temp / "demo" / "report.html", temp)
     print(f"{len(FAULTS)} faults")
     sys.exit(1 if FAULTS else 0)
 

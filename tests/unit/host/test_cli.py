@@ -109,13 +109,15 @@ def test_usage():
         if command != "replay":  # which takes several: tests/golden/batch.py
             expect(f"{command} a b", [command, "a", "b", "-o", "x"] if command != "info" else [command, "a", "b"], 2,
                    "one word too many: 'b'", n_lines=1)
-    for later in ("--image=iwe", "--warp=tiled", "--velocity=on", "--writ=events", "--i"):
-        expect("an option of a later module", ["replay", "x", "-o", "y", later], 2, "unknown option", n_lines=1)
+    for unknown in ("--writ=events", "--i"):
+        expect("an unknown option", ["replay", "x", "-o", "y", unknown], 2, "unknown option", n_lines=1)
     for option, value in (("--window", "area:34x26"), ("--window", "count:0"), ("--window", "time:1.5"), ("--window", "roi:1"),
                           ("--window", "area:0x26:200"), ("--window", "area:34x26:99999"), ("--rotation", "both"),
                           ("--saccade", "1"), ("--attitude", "magic"), ("--imu-offset-us", "1ms"), ("--imu-offset-us", "99999999"),
                           ("--from", "now"), ("--to", ""), ("--size", "240"), ("--size", "240x0"), ("--size", "4096x4096"),
-                          ("--write", "frames"), ("--write", "events,frames"), ("--video", "a.avi"), ("--imu-order", "gyro")):
+                          ("--write", "pictures"), ("--write", "events,"), ("--write", "events;frames"), ("--image", "none"), ("--image", "iw"),
+                          ("--warp", "off"), ("--velocity", "yes"), ("--method", "erl-v"), ("--baseline-ms", "30"),
+                          ("--baseline-ms", "30:20"), ("--baseline-ms", "0.5:20"), ("--baseline-ms", "30:9999"), ("--video", "a.avi"), ("--imu-order", "gyro")):
         folder = recording("usage")
         expect(f"{option} {value}", ["replay", folder, "-o", "out_usage", option, value], 2, option, n_lines=1)
     expect("demo --help", ["demo", "--help"], 0, ">Usage: evstab demo", ">Exit status", n_lines=0)
@@ -218,6 +220,135 @@ def test_replay():
     row = (ROOT / "out/epoch/events.csv").read_text().splitlines()[1000]
     check("keep their microseconds", re.match(rf"{epoch}\.0999\d\d,", row) is not None, row)
     expect("clocks that do not meet", ["replay", recording("apart", imu_txt=imu(t0=500)), "-o", "out/apart"], 0, "have no orientation", n_lines=1)
+
+
+def flight_events(n=60000, seconds=0.6):
+    """Points on a wall that comes nearer: the flow spreads from the middle. Deterministic, and nothing turns."""
+    state = 1
+    points = []
+    for _ in range(120):
+        state = state * 1103515245 + 12345 & 0x7fffffff
+        x = (state >> 8) % 1000 / 1000 * 1.4 - 0.7
+        state = state * 1103515245 + 12345 & 0x7fffffff
+        points.append((x, (state >> 8) % 1000 / 1000 * 1.1 - 0.55))
+    rows = []
+    for i in range(n):
+        state = state * 1103515245 + 12345 & 0x7fffffff
+        x, y = points[(state >> 8) % len(points)]
+        t = i / n * seconds
+        scale = 200 / (1 - 0.5 * t)
+        u, v = round(x * scale + 120 + (state >> 20 & 1)), round(y * scale + 90 + (state >> 21 & 1))
+        if 0 <= u < 240 and 0 <= v < 180:
+            rows.append(f"{1 + t:.6f} {u} {v} {i & 1}\n")
+    return "".join(rows)
+
+
+def test_velocity():
+    straight = "200 200 120 90 0 0 0 0 0\n"
+    still = "".join(f"{0.9 + i * 0.005:.6f} 0 0 {0.5 * max(0.0, i * 0.005 - 0.1):.6f} 0 0 0 1\n" for i in range(200))
+    recording("flight", events_txt=flight_events(), imu_txt=None, groundtruth_txt=still, calib_txt=straight)
+    expect("direction of flight", ["replay", "flight", "-o", "out/v"], 0, ">direction of flight from", ">median angle to the truth",
+           ">velocity.csv pairs.csv", n_lines=0)
+    s = summary("out/v")
+    settings = s["settings"]
+    check("defaults", (settings["velocity"], settings["image"], settings["warp"], settings["method"]) == ("on", "iwe", "none", "erlv"), settings)
+    rows = (ROOT / "out/v/velocity.csv").read_text().splitlines()
+    check("header of velocity.csv", rows[0] == "#t_s,vx,vy,vz,sigma_deg,n_flow,n_inliers", rows[0])
+    table = [[float(v) for v in row.split(",")] for row in rows[1:]]
+    check("some directions", len(table) == s["velocity"]["valid"] >= 5, s["velocity"])
+    check("unit vectors, ahead", all(abs(sum(v * v for v in row[1:4]) - 1) < 1e-6 and row[3] > 0.98 for row in table), table)
+    check("in order", all(a[0] < b[0] for a, b in zip(table, table[1:])))
+    check("an uncertainty in degrees", all(0 < row[4] < 30 for row in table), table)
+    check("inliers of the flow", all(8 <= row[6] <= row[5] for row in table), table)
+    pairs = (ROOT / "out/v/pairs.csv").read_text().splitlines()
+    check("header of pairs.csv", pairs[0] == "#t_s,interval_s,result,flow_px,n_corners,n_flow,n_inliers,saccade", pairs[0])
+    results = [row.split(",")[2] for row in pairs[1:]]
+    v = s["velocity"]
+    check("every pair is there", len(results) == v["pairs"] and results.count("valid") == v["valid"] and
+          results.count("few") == v["invalid"]["few_features"] and results.count("still") == v["invalid"]["too_little_motion"] and
+          results.count("unsolved") == v["invalid"]["no_direction_fits"], (v, results))
+    valid = [row.split(",")[0] for row in pairs[1:] if row.split(",")[2] == "valid"]
+    check("at the same times", valid == [row.split(",")[0] for row in rows[1:]])
+    check("images and pairs add up", s["images"]["made"] == v["pairs"] + v["images_without_an_older_one"] > 5, s)
+    check("intervals within the limits", all(0.015 <= float(row.split(",")[1]) <= 0.5 for row in pairs[1:]), pairs)
+    check("memory is told", 200_000 < s["library_memory_bytes"] < 4_000_000, s["library_memory_bytes"])
+
+    again = run("replay", "flight", "-o", "out/v2", "-q", "--no-report")
+    check("same input, same bytes", again.returncode == 0 and
+          (ROOT / "out/v2/velocity.csv").read_bytes() == (ROOT / "out/v/velocity.csv").read_bytes())
+    expect("off", ["replay", "flight", "-o", "out/v2", "-q", "--velocity", "off"], 0, n_lines=0)
+    check("off leaves no file, not that of an earlier run either", not (ROOT / "out/v2/velocity.csv").exists() and
+          not (ROOT / "out/v2/pairs.csv").exists() and "velocity" not in summary("out/v2") and "images" not in summary("out/v2"))
+    windows = [(ROOT / out / "windows.csv").read_bytes() for out in ("out/v", "out/v2")]
+    check("and the same windows", windows[0] == windows[1])
+
+    # Across the wrap of the device's clock, and with times since 1970.
+    for name, t0 in (("flight_wrap", 4294.5), ("flight_epoch", 1403715273)):
+        shifted = "".join(f"{float(row.split(' ', 1)[0]) - 1 + t0:.6f} {row.split(' ', 1)[1]}\n" for row in flight_events().splitlines())
+        moved = "".join(f"{float(row.split(' ', 1)[0]) - 1 + t0:.6f} {row.split(' ', 1)[1]}\n" for row in still.splitlines())
+        recording(name, events_txt=shifted, imu_txt=None, groundtruth_txt=moved, calib_txt=straight)
+        expect(name, ["replay", name, "-o", f"out/{name}", "-q", "--no-report"], 0)
+        other = [row.split(",") for row in (ROOT / f"out/{name}/velocity.csv").read_text().splitlines()]
+        check(f"{name}: the same directions", [row[1:] for row in other[1:]] == [row.split(",")[1:] for row in rows[1:]])
+        check(f"{name}: at their own times", abs(float(other[1][0]) - t0 - (table[0][0] - 1)) < 2e-6, (other[1][0], table[0][0]))
+
+    kinds = {}
+    for words in (["--image", "surface"], ["--image", "count"], ["--warp", "predicted"], ["--baseline-ms", "20:40"], ["--rotation", "window"]):
+        key = " ".join(words)
+        expect(key, ["replay", "flight", "-o", "out/k", "-q", "--no-report", *words], 0)
+        option = words[0][2:]
+        k = summary("out/k")
+        check(f"{key}: is told", k["settings"].get(option, words[1]) == words[1], k["settings"])
+        kinds[key] = (ROOT / "out/k/velocity.csv").read_bytes()
+        check(f"{key}: gives directions", k["velocity"]["valid"] > 0, k["velocity"])
+    base = (ROOT / "out/v/velocity.csv").read_bytes()
+    check("each makes a difference", base not in [kinds[k] for k in kinds if k != "--rotation window"] and
+          len(set(kinds.values())) == len(kinds), [k for k in kinds if kinds[k] == base])
+    check("but not how often the poses that do not turn are asked", kinds["--rotation window"] == base)
+    expect("paper", ["replay", "flight", "-o", "out/paper", "-q", "--no-report", "--paper"], 0)
+    p = summary("out/paper")["settings"]
+    check("paper", (p["image"], p["window_min_us"], p["window_max_us"]) == ("iwe", 0, None), p)
+    expect("paper, but", ["replay", "flight", "-o", "out/paper", "-q", "--no-report", "--paper", "--warp", "none", "--image", "surface"], 0)
+    p = summary("out/paper")["settings"]
+    check("options count more", (p["warp"], p["image"]) == ("none", "surface"), p)
+    write("images.yaml", "image: surface\nvelocity: True\n")
+    expect("parameter file", ["replay", "flight", "-o", "out/y2", "-q", "--no-report", "--config", "images.yaml"], 0)
+    p = summary("out/y2")["settings"]
+    check("parameter file, and an option over it", (p["image"], p["velocity"]) == ("surface", "on"), p)
+
+    folder = ["replay", "flight", "-o", "out/refused"]
+    expect("a warp of a surface", [*folder, "--image", "surface", "--warp", "predicted"], 2, "--warp is 'predicted'", "--image surface", n_lines=1)
+    expect("a warp by no flow", [*folder, "--velocity", "off", "--warp", "predicted", "--image", "iwe"], 2, "--velocity on", n_lines=1)
+    bare = ["replay", "flight/events.txt", "-o", "out/refused"]
+    expect("no lens, no direction", [*bare, "--velocity", "on", "--attitude", "none"], 1, "--velocity on needs the lens", "--calib", n_lines=1)
+    check("no litter", not (ROOT / "out/refused").exists())
+    expect("unless nobody asks", [*bare, "--attitude", "none"], 0)
+    check("then it is off", summary("out/refused")["settings"]["velocity"] == "off")
+    expect("without attitude only when asked", ["replay", "flight", "-o", "out/na", "--attitude", "none", "--velocity", "on"], 0,
+           "does not turn")
+    check("which is the same where nothing turns", abs(len((ROOT / "out/na/velocity.csv").read_text().splitlines()) - len(rows)) <= 2)
+    for size in ("34x26", "346x260"):
+        expect(f"a sensor of {size}", ["replay", "flight", "-o", "out/small", "-q", "--no-report", "--size", size, "--window", "count:60"], 0)
+        check(f"and a sensor of {size}", summary("out/small")["velocity"]["pairs"] > 0, summary("out/small"))
+    recording("no_texture", events_txt="".join(f"{1 + i * 1e-5:.6f} 120 90 1\n" for i in range(30000)), imu_txt=None, groundtruth_txt=still,
+              calib_txt=straight)
+    expect("nothing to see", ["replay", "no_texture", "-o", "out/nt", "--velocity", "on"], 0, "no direction of flight: ")
+    check("gives no direction", len((ROOT / "out/nt/velocity.csv").read_text().splitlines()) == 1 and
+          summary("out/nt")["velocity"]["valid"] == 0, summary("out/nt"))
+
+    expect("frames", ["replay", "flight", "-o", "out/f", "-q", "--no-report", "--write", "events,frames"], 0, n_lines=0)
+    listed = [row.split(",") for row in (ROOT / "out/f/frames/frames.csv").read_text().splitlines()]
+    files = sorted(path.name for path in (ROOT / "out/f/frames").glob("*.png"))
+    check("an image per window", listed[0] == ["#window", "t_s", "file"] and [row[2] for row in listed[1:]] == files and
+          len(files) == summary("out/f")["images"]["made"], (len(listed), len(files)))
+    check("PNG files", all((ROOT / "out/f/frames" / name).read_bytes()[:8] == b"\x89PNG\r\n\x1a\n" for name in files))
+    check("events.csv too", (ROOT / "out/f/events.csv").exists())
+    expect("fewer frames", ["replay", "flight", "-o", "out/f", "-q", "--no-report", "--write", "frames", "--to", "1.2", "--velocity", "off"], 0)
+    left = sorted(path.name for path in (ROOT / "out/f/frames").glob("*.png"))
+    check("leave none of those before", 0 < len(left) == summary("out/f")["images"]["made"] < len(files), (len(left), len(files)))
+    (ROOT / "out/blocked").mkdir(parents=True)
+    (ROOT / "out/blocked/frames").write_text("in the way")
+    expect("frames cannot be written", ["replay", "flight", "-o", "out/blocked", "--write", "frames"], 1, "frames", n_lines=1)
 
 
 def test_terminal():
@@ -445,7 +576,7 @@ def test_info():
 
 def main():
     try:
-        for test in (test_usage, test_replay, test_terminal, test_bad_input, test_attitude, test_lut, test_info):
+        for test in (test_usage, test_replay, test_velocity, test_terminal, test_bad_input, test_attitude, test_lut, test_info):
             test()
     finally:
         shutil.rmtree(ROOT, ignore_errors=True)

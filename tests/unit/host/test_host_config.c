@@ -51,6 +51,30 @@ static void test_the_papers_parameter_names_are_understood(void)
     TEST_ASSERT_TRUE(config.has_from_imu && config.from_imu);
 }
 
+static void test_what_becomes_of_a_window_can_be_told_too(void)
+{
+    static const char *const BAD[] = {
+        "image: iw\n",  "image: iwe,\n", "image: iwe, surface\n", "image: ''\n",         "image: [iwe]\n",
+        "warp: tile\n", "warp: off\n",   "velocity: maybe\n",     "method: erlv-pape\n", "method: erl-v\n"};
+    TEST_ASSERT_TRUE_MESSAGE(parse("node:\n  image: surface\n  warp: predicted\n  velocity: off\n  method: erl\n"),
+                             err.text);
+    TEST_ASSERT_EQUAL_STRING("surface", config.image);
+    TEST_ASSERT_EQUAL_STRING("predicted", config.warp);
+    TEST_ASSERT_EQUAL_STRING("erl", config.method);
+    TEST_ASSERT_TRUE(config.has_velocity && !config.velocity);
+    TEST_ASSERT_TRUE_MESSAGE(parse("image: count\nwarp: none\nvelocity: True\nmethod: erlv-paper\n"), err.text);
+    TEST_ASSERT_EQUAL_STRING("count", config.image);
+    TEST_ASSERT_EQUAL_STRING("erlv-paper", config.method);
+    TEST_ASSERT_TRUE(parse("K: [200, 0, 120, 0, 200, 90, 0, 0, 1]\n"));
+    TEST_ASSERT_EQUAL_STRING("", config.image);
+    TEST_ASSERT_FALSE(config.has_velocity);
+    for (size_t i = 0u; i < sizeof BAD / sizeof BAD[0]; i++) {
+        memset(&err, 0, sizeof err);
+        TEST_ASSERT_FALSE_MESSAGE(parse(BAD[i]), BAD[i]);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(err.text, "test.yaml: line 1: "), err.text);
+    }
+}
+
 static void test_keys_nested_under_a_node_name_are_found(void)
 {
     TEST_ASSERT_TRUE_MESSAGE(
@@ -170,6 +194,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_the_papers_parameter_names_are_understood);
+    RUN_TEST(test_what_becomes_of_a_window_can_be_told_too);
     RUN_TEST(test_keys_nested_under_a_node_name_are_found);
     RUN_TEST(test_an_external_rotation_that_is_switched_off_is_not_used);
     RUN_TEST(test_euroc_sensor_file_gives_the_camera_and_its_rotation);

@@ -278,6 +278,121 @@ static void test_velocity_comes_from_positions_into_the_frame_of_the_camera(void
     TEST_ASSERT_TRUE(evl_velocity_at(&truth, 10000, &v));
 }
 
+static void test_velocity_is_the_slope_of_the_parabola_through_noisy_positions(void)
+{
+    evl_velocity_truth_t truth;
+    evh_poses_t ref;
+    evl_vec3_t v;
+    double worst = 0.0;
+    for (int i = 0; i < 200; i++) {
+        const double s = 0.005 * i;
+        set_pose(&ref_pose[i], 5000 * i, turn(0, 0, 0));
+        ref_pose[i].p_m[0] = 100.0 + 0.5 * s + 2.0 * s * s; /* Far away: digits must not get lost. */
+        ref_pose[i].p_m[1] = ((i % 4) < 2) ? 0.001 : -0.001;
+    }
+    ref = track(ref_pose, 200u);
+    memset(&truth, 0, sizeof truth);
+    truth.poses = &ref;
+    truth.baseline_us = 40000;
+    truth.q_bc = evl_quat_identity();
+    for (int t_us = 500000; t_us < 520000; t_us += 5000) {
+        TEST_ASSERT_TRUE(evl_velocity_at(&truth, t_us, &v));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5 + 4.0 * 1e-6 * t_us, v.x);
+        worst = (fabs(v.y) > worst) ? fabs(v.y) : worst;
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(0.0134, 0.0, worst); /* 4 mm / (60 * 5 ms); of two samples 10 ms apart: 0.2 m/s. */
+    TEST_ASSERT_TRUE(evl_velocity_at(&truth, 501000, &v)); /* Between samples: off the middle, yet right. */
+    TEST_ASSERT_DOUBLE_WITHIN(0.005, 0.5 + 4.0 * 0.501, v.x);
+    truth.baseline_us = 4000; /* No sample within: the line through the ends. */
+    TEST_ASSERT_TRUE(evl_velocity_at(&truth, 502500, &v));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5 + 4.0 * 0.5025, v.x);
+}
+
+static void test_flow_over_an_interval_is_held_to_the_mean_velocity_over_it(void)
+{
+    evl_velocities_t est;
+    evl_velocity_truth_t truth;
+    evl_velocity_result_t r;
+    evh_poses_t ref;
+    evl_vec3_t v;
+    for (int i = 0; i < 200; i++) { /* Along x, and from 0.5 s on along y. */
+        set_pose(&ref_pose[i], 5000 * i, turn(0, 0, 0));
+        ref_pose[i].p_m[0] = (i <= 100) ? 0.005 * i : 0.5;
+        ref_pose[i].p_m[1] = (i <= 100) ? 0.0 : 0.005 * (i - 100);
+    }
+    ref = track(ref_pose, 200u);
+    TEST_ASSERT_TRUE(evl_velocity_over(&ref, evl_quat_identity(), 480000, 200000, &v));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.12 / 0.2, v.x);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.08 / 0.2, v.y);
+    TEST_ASSERT_TRUE(evl_velocity_over(&ref, turn(0, 0, 90), 480000, 200000, &v)); /* The camera's x is the body's y. */
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.08 / 0.2, v.x);
+    TEST_ASSERT_FALSE(evl_velocity_over(&ref, evl_quat_identity(), 480000, 0, &v));
+    TEST_ASSERT_FALSE(evl_velocity_over(&ref, evl_quat_identity(), 50000, 200000, &v));
+
+    TEST_ASSERT_TRUE(evl_velocities_read(&est, temp_text("0.30 1 0 0\n0.48 1 0 0\n0.60 1 0 0\n"), &err));
+    temp_file_remove();
+    TEST_ASSERT_TRUE(evl_velocities_read_intervals(&est,
+                                                   temp_text("#t_s,interval_s,result,flow_px\n0.10,0.07,few,0\n"
+                                                             "0.48,0.2,valid,4\n0.50,0.2,still,0\n0.60,0.1,valid,4\n"),
+                                                   &err));
+    TEST_ASSERT_EQUAL_INT64(0, est.at[0].interval_us);
+    TEST_ASSERT_EQUAL_INT64(200000, est.at[1].interval_us);
+    TEST_ASSERT_EQUAL_INT64(100000, est.at[2].interval_us);
+    memset(&truth, 0, sizeof truth);
+    truth.poses = &ref;
+    truth.baseline_us = 20000;
+    truth.q_bc = evl_quat_identity();
+    TEST_ASSERT_TRUE(evl_velocity_compare(&est, &truth, INT64_MIN, INT64_MAX, &r));
+    TEST_ASSERT_EQUAL_UINT(3u, r.error_deg.n);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 30.0, r.error_deg.mean); /* 0, 0, 90 */
+    TEST_ASSERT_EQUAL_UINT(2u, r.interval_error_deg.n);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.5 * (EVL_DEG_PER_RAD * atan2(2.0, 3.0) + 90.0), r.interval_error_deg.mean);
+    evl_velocities_free(&est);
+}
+
+static void test_an_estimate_covers_the_time_after_it(void)
+{
+    evl_velocities_t est;
+    TEST_ASSERT_TRUE(
+        evl_velocities_read(&est, temp_text("0.10 1 0 0\n0.15 1 0 0\n0.20 0 0 0\n0.60 0 0 1\n0.98 1 0 0\n"), &err));
+    /* 0.10 .. 0.25, 0.60 .. 0.70, 0.98 .. 1 of 1 s. The zero vector is no estimate. */
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.27, evl_velocity_coverage(&est, 0, 1000000));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.05 / 0.4, evl_velocity_coverage(&est, 200000, 600000));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.0, evl_velocity_coverage(&est, 120000, 220000));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0, evl_velocity_coverage(&est, 5000000, 6000000));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0, evl_velocity_coverage(&est, 100000, 100000));
+    evl_velocities_free(&est);
+}
+
+static void test_an_estimate_is_held_to_the_uncertainty_that_it_tells(void)
+{
+    evl_velocities_t est;
+    evl_velocities_t table;
+    evl_velocity_truth_t truth;
+    evl_velocity_result_t r;
+    memset(&truth, 0, sizeof truth);
+    TEST_ASSERT_TRUE(
+        evl_velocities_read(&table, temp_text("0.00 1 0 0\n0.05 1 0 0\n0.10 1 0 0\n0.15 0.01 0 0\n"), &err));
+    temp_file_remove();
+    TEST_ASSERT_TRUE(isnan(table.at[0].sigma_deg));
+    TEST_ASSERT_TRUE(evl_velocities_read(&est,
+                                         temp_text("#t_s,vx,vy,vz,sigma_deg,n_flow,n_inliers\n"
+                                                   "0.00,1,1,0,46,9,9\n"   /* 45 degrees: within */
+                                                   "0.03,1,1,0,23,9,9\n"   /* within 2 */
+                                                   "0.05,1,1,0,22,9,9\n"   /* beyond */
+                                                   "0.10,1,1,0,,9,9\n"     /* does not tell */
+                                                   "0.15,1,1,0,90,9,9\n"), /* slow */
+                                         &err));
+    truth.table = &table;
+    TEST_ASSERT_TRUE(evl_velocity_compare(&est, &truth, INT64_MIN, INT64_MAX, &r));
+    TEST_ASSERT_EQUAL_UINT(4u, r.error_deg.n);
+    TEST_ASSERT_EQUAL_UINT(3u, r.n_sigma);
+    TEST_ASSERT_EQUAL_UINT(1u, r.n_within_sigma);
+    TEST_ASSERT_EQUAL_UINT(2u, r.n_within_2_sigma);
+    evl_velocities_free(&est);
+    evl_velocities_free(&table);
+}
+
 static void test_slow_samples_zero_vectors_and_missing_truth_are_counted_and_left_out(void)
 {
     evl_velocities_t est;
@@ -337,6 +452,10 @@ int main(void)
     RUN_TEST(test_a_full_alignment_of_a_camera_that_hardly_turns_says_so);
     RUN_TEST(test_the_error_over_a_time_ignores_what_is_constant);
     RUN_TEST(test_velocity_comes_from_positions_into_the_frame_of_the_camera);
+    RUN_TEST(test_velocity_is_the_slope_of_the_parabola_through_noisy_positions);
+    RUN_TEST(test_flow_over_an_interval_is_held_to_the_mean_velocity_over_it);
+    RUN_TEST(test_an_estimate_covers_the_time_after_it);
+    RUN_TEST(test_an_estimate_is_held_to_the_uncertainty_that_it_tells);
     RUN_TEST(test_slow_samples_zero_vectors_and_missing_truth_are_counted_and_left_out);
     RUN_TEST(test_a_velocity_file_without_the_columns_is_refused);
     return UNITY_END();

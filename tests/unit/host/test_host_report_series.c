@@ -31,6 +31,19 @@ static void test_few_samples_are_all_kept(void)
     TEST_ASSERT_EQUAL_size_t(80u, n_kept());
 }
 
+static void test_a_sample_keeps_its_own_spread(void)
+{
+    evr_sample_t out[2];
+    for (int i = 0; i < 10; i++) { evr_series_put_spread(&s, i, i, 0.1 * i); } /* One bin. */
+    TEST_ASSERT_EQUAL_size_t(2u, evr_series_samples(&s.bin[0], out));
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, out[0].spread);
+    TEST_ASSERT_EQUAL_DOUBLE(0.9, out[1].spread);
+    for (int i = 0; i < 5000; i++) { evr_series_put(&s, 1000 * i, 5.0); } /* Bins merge. */
+    TEST_ASSERT_EQUAL_size_t(2u, evr_series_samples(&s.bin[0], out));
+    TEST_ASSERT_EQUAL_DOUBLE(9.0, out[1].value);
+    TEST_ASSERT_EQUAL_DOUBLE(0.9, out[1].spread);
+}
+
 static void test_a_peak_survives_any_length(void)
 {
     double low = 1e9;
@@ -117,6 +130,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_few_samples_are_all_kept);
+    RUN_TEST(test_a_sample_keeps_its_own_spread);
     RUN_TEST(test_a_peak_survives_any_length);
     RUN_TEST(test_the_two_samples_of_a_bin_come_in_the_order_of_time);
     RUN_TEST(test_a_time_before_the_start_is_ignored);

@@ -1,0 +1,212 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+# SPDX-FileCopyrightText: 2026 the evstab authors
+"""How well evstab replay tells the direction of flight, on simulated flights with exact truth and on real recordings. Errors
+are computed here, from velocity.csv and the truth alone.
+
+usage: velocity.py EVSTAB truth|order|imu|slider|windows
+
+truth    two simulated flights, default settings, true attitude: the error, its own idea of it, and how often there is one
+order    the paper's claims: stabilized beats full ERL on the same flow, IWE beats time surface, slices beat windows, and
+         a rotation per window needs a warp
+imu      the attitude from the IMU, its gyro bias known: little worse than true attitude
+slider   a complete real recording that moves along +x
+windows  short real recordings of a camera that is moved by hand
+
+Exits 77 when numpy or the recordings (EVS_DATA_DIR) are not there.
+"""
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+try:
+    import numpy as np
+except ImportError as error:
+    print(f"SKIPPED: {error}; install tests/requirements.txt")
+    sys.exit(77)
+
+import replay_model as model
+
+DATA = pathlib.Path(os.environ.get("EVS_DATA_DIR", "."))
+FAULTS = []
+SLOW = 0.25  # of the mean speed: below it a direction means little
+
+
+def check(what, ok, detail):
+    print(f"{'ok  ' if ok else 'FAIL'} {what}: {detail}")
+    if not ok:
+        FAULTS.append(what)
+
+
+def need(*paths):
+    for path in paths:
+        if not path.exists() and not path.with_name(path.name + ".gz").exists():
+            print(f"SKIPPED: {path} is not there; EVS_DATA_DIR names the folder of recordings")
+            sys.exit(77)
+
+
+class Run:
+    """A replay and what it wrote."""
+
+    def __init__(self, evstab, out, *arguments):
+        done = subprocess.run([evstab, "replay", "--no-report", "-o", str(out), *map(str, arguments)], text=True,
+                              capture_output=True)
+        self.notes = done.stderr
+        if done.returncode != 0:
+            print(done.stderr, end="")
+            print(f"FAIL evstab replay exits {done.returncode}")
+            sys.exit(1)
+        self.summary = json.loads((out / "summary.json").read_text())
+        table = read_rows(out / "velocity.csv", 7)
+        self.t, self.v, self.sigma, self.inliers = table[:, 0], table[:, 1:4], table[:, 4], table[:, 6]
+        check("rows in order, unit vectors", bool((np.diff(self.t) > 0).all()) and
+              bool(np.allclose(np.linalg.norm(self.v, axis=1), 1, atol=1e-6)), f"{len(self.t)} rows")
+        check("as many as the summary says", len(self.t) == self.summary["velocity"]["valid"], self.summary["velocity"])
+
+
+def read_rows(path, n_columns):
+    lines = [line for line in path.read_text().splitlines() if line and line[0] != "#"]
+    return np.array([[float(field) for field in line.split(",")[:n_columns]] for line in lines]).reshape(-1, n_columns)
+
+
+def angle(a, b):
+    cosine = (a * b).sum(axis=1) / (np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1))
+    return np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+
+
+class Errors:
+    """Against a table of true velocities in the camera's frame."""
+
+    def __init__(self, run, truth, only=None):
+        true = np.stack([np.interp(run.t, truth[:, 0], truth[:, k]) for k in (1, 2, 3)], axis=1)
+        speed = np.linalg.norm(true, axis=1)
+        self.kept = (speed >= SLOW * speed.mean()) & (run.t >= truth[0, 0]) & (run.t <= truth[-1, 0])
+        if only is not None:
+            self.kept &= np.isin(np.round(run.t * 1e6), np.round(only * 1e6))
+        self.all = angle(run.v, true)
+        self.deg = self.all[self.kept]
+        self.mean, self.median = float(self.deg.mean()), float(np.median(self.deg))
+
+    def text(self):
+        return (f"mean {self.mean:.2f}, median {self.median:.2f}, 95 % {np.percentile(self.deg, 95):.2f}, "
+                f"max {self.deg.max():.2f} deg of {len(self.deg)}")
+
+
+def flight(name):
+    folder = DATA / "sim" / name
+    need(folder / "events.txt", folder / "velocity.txt", folder / "groundtruth.txt", folder / "imu.txt")
+    return folder, model.read_table(folder / "velocity.txt")
+
+
+FLIGHTS = [("sim1_21", 2.5), ("sim3_23", 4.5)]
+
+
+def test_truth(evstab, temp):
+    for name, bound in FLIGHTS:
+        folder, truth = flight(name)
+        run = Run(evstab, temp / name, folder, "--attitude", "truth")
+        errors = Errors(run, truth)
+        check(f"{name}: mean error", errors.mean <= bound, f"{errors.text()}; at most {bound}")
+        v = run.summary["velocity"]
+        print(f"     {v['pairs']} pairs: {v['invalid']}; {v['mean']}; {v['library_ns_per_image'] * 1e-6:.2f} ms per image, "
+              f"{run.summary['library_memory_bytes']} bytes")
+        check(f"{name}: no direction is turned about", float(errors.deg.max()) < 90, f"{errors.deg.max():.1f} deg at most")
+        duration = run.summary["duration_s"]
+        ages = np.diff(np.append(run.t, run.summary["t_last_s"]))
+        covered = float(np.minimum(ages, 0.1).sum()) / duration
+        check(f"{name}: an estimate of the last 0.1 s is at hand", covered > 0.8, f"{100 * covered:.1f} % of {duration:.2f} s, "
+              f"{len(run.t) / duration:.1f} per s")
+        sigma = run.sigma[errors.kept]
+        within = [float((errors.deg <= k * sigma).mean()) for k in (1, 2)]
+        check(f"{name}: within 2 sigma", within[1] >= 0.75, f"{100 * within[0]:.0f} % within 1, {100 * within[1]:.0f} % within 2; "
+              f"median sigma {np.median(sigma):.2f} deg")
+
+        # evstab eval tells the same.
+        done = subprocess.run([evstab, "eval", str(temp / name), "--truth", str(folder / "groundtruth.txt"), "--velocity-truth",
+                               str(folder / "velocity.txt"), "-q"], text=True, capture_output=True)
+        told = json.loads((temp / name / "eval.json").read_text())["velocity"] if done.returncode == 0 else {}
+        direction = told.get("direction", {})
+        check(f"{name}: evstab eval", direction.get("n") == len(errors.deg) and
+              abs(direction["mean_deg"] - errors.mean) < 1e-3 and abs(direction["median_deg"] - errors.median) < 1e-3 and
+              abs(told["within_2_sigma_share"] - within[1]) < 1e-6 and abs(told["covered_share"] - covered) < 1e-3,
+              done.stderr or f"{direction}, over the interval {told.get('direction_over_interval', {}).get('mean_deg')}")
+
+
+def test_order(evstab, temp):
+    sums = {}
+    for name, _ in FLIGHTS:
+        folder, truth = flight(name)
+        variants = {"stabilized": (), "full ERL": ("--method", "erl"), "surface": ("--image", "surface"),
+                    "window": ("--rotation", "window"), "window, tiled": ("--rotation", "window", "--warp", "tiled"),
+                    "as published": ("--method", "erlv-paper")}
+        runs = {key: Run(evstab, temp / f"{name} {key}", folder, "--attitude", "truth", *words)
+                for key, words in variants.items()}
+        for key, run in runs.items():
+            only = None
+            if key == "full ERL":  # The same flow: pairs that both solvers have an answer for.
+                only = runs["stabilized"].t[np.isin(np.round(runs["stabilized"].t * 1e6), np.round(run.t * 1e6))]
+                same = Errors(runs["stabilized"], truth, only)
+                sums.setdefault("stabilized, same pairs", []).append(same.mean)
+            errors = Errors(run, truth, only)
+            sums.setdefault(key, []).append(errors.mean)
+            print(f"     {name}, {key}: {errors.text()}")
+    mean = {key: sum(values) / len(values) for key, values in sums.items()}
+    print("     means: " + ", ".join(f"{key} {value:.2f}" for key, value in mean.items()))
+    for i, (name, _) in enumerate(FLIGHTS):
+        check(f"{name}: stabilized ERL-V < 1/3 of full ERL on the same flow",
+              sums["stabilized, same pairs"][i] < sums["full ERL"][i] / 3,
+              f"{sums['stabilized, same pairs'][i]:.2f} and {sums['full ERL'][i]:.2f} deg")
+        check(f"{name}: IWE < time surface", sums["stabilized"][i] < sums["surface"][i],
+              f"{sums['stabilized'][i]:.2f} and {sums['surface'][i]:.2f} deg")
+        check(f"{name}: rotation per slice < per window without warp", sums["stabilized"][i] < sums["window"][i],
+              f"{sums['stabilized'][i]:.2f} and {sums['window'][i]:.2f} deg")
+    check("a warp helps rotation per window", mean["window, tiled"] < mean["window"],
+          f"{mean['window, tiled']:.2f} and {mean['window']:.2f} deg")
+
+
+def test_imu(evstab, temp):
+    for name, _ in FLIGHTS:
+        folder, truth = flight(name)
+        imu = model.read_table(folder / "imu.txt")
+        rate = np.stack([np.interp(imu[:, 0], truth[:, 0], truth[:, k]) for k in (4, 5, 6)], axis=1)
+        inside = (imu[:, 0] >= truth[0, 0]) & (imu[:, 0] <= truth[-1, 0])
+        bias = (imu[inside, 4:7] - rate[inside]).mean(axis=0)
+        imu[:, 4:7] -= bias
+        known = temp / f"{name}_imu.txt"
+        np.savetxt(known, imu, fmt="%.9f")
+        by_truth = Errors(Run(evstab, temp / f"{name} truth", folder, "--attitude", "truth"), truth)
+        by_imu = Errors(Run(evstab, temp / f"{name} imu", folder, "--attitude", "imu", "--imu", known), truth)
+        raw = Errors(Run(evstab, temp / f"{name} raw", folder, "--attitude", "imu"), truth)
+        print(f"     {name}: bias {np.round(bias, 4)} rad/s; not removed: {raw.text()}")
+        check(f"{name}: attitude from the IMU", by_imu.mean <= 1.3 * by_truth.mean,
+              f"{by_imu.text()}; {by_imu.mean / by_truth.mean:.2f} times that of true attitude")
+
+
+def test_slider(evstab, temp):
+    folder = DATA / "ecd" / "slider_depth"
+    need(folder / "events.txt", folder / "calib.txt")
+    run = Run(evstab, temp / "out", folder)
+    errors = angle(run.v, np.array([[1.0, 0.0, 0.0]]))
+    check("slider_depth: median angle to +x", float(np.median(errors)) <= 6.0,
+          f"median {np.median(errors):.2f}, mean {errors.mean():.2f}, 95 % {np.percentile(errors, 95):.2f}, max {errors.max():.2f} "
+          f"deg of {len(errors)}")
+    check("slider_depth: sign", bool((run.v[:, 0] > 0).all()), "always to the right")
+    print(f"     {run.summary['velocity']}")
+
+
+TESTS = {"truth": test_truth, "order": test_order, "imu": test_imu, "slider": test_slider}
+
+
+def main():
+    if len(sys.argv) != 3 or sys.argv[2] not in TESTS:
+        print(__doc__)
+        sys.exit(2)
+    with tempfile.TemporaryDirectory(prefix="evstab_velocity_") as temp:
+        TESTS[sys.argv[2]](str(pathlib.Path(sys.argv[1]).resolve()), pathlib.Path(temp))
+    sys.exit(1 if FAULTS else 0)
+
+
+main()
