@@ -17,7 +17,7 @@ evs_keyframes_config_t evs_keyframes_config_default(const evs_pinhole_t *pinhole
     const evs_keyframes_config_t cfg = {.pinhole = *pinhole,
                                         .n_stored = 3u,
                                         .target_px_q4 = 64u,
-                                        .baseline_min_us = 30000u,
+                                        .baseline_min_us = 10000u,
                                         .baseline_max_us = 250000u,
                                         .baseline_first_us = 70000u,
                                         .age_max_us = 400000u};

@@ -33,6 +33,8 @@ evs_pipeline_config_t evs_pipeline_config_default(const evs_camera_config_t *cam
                                        .iwe = evs_iwe_config_default(camera->width_px, camera->height_px),
                                        .surface = evs_surface_config_default(camera->width_px, camera->height_px),
                                        .warp = EVS_PIPELINE_WARP_NONE,
+                                       .warp_search =
+                                           evs_warp_config_default(EVS_WARP_TILED, camera->width_px, camera->height_px),
                                        .velocity_on = false,
                                        .velocity = evs_velocity_config_default(&pinhole)};
     return cfg;
@@ -59,7 +61,7 @@ static bool capacities_ok(const evs_pipeline_config_t *cfg)
            (cfg->camera.height_px >= 1u) && (cfg->camera.height_px <= EVS_SENSOR_MAX_PX) && (cfg->n_fifo >= 2u) &&
            (cfg->n_fifo <= FIFO_MAX) && (cfg->n_ring >= EVS_ORIENTATION_TRACK_MIN) && (cfg->n_ring <= FIFO_MAX) &&
            (cfg->n_batch >= 1u) && (cfg->n_batch <= cfg->n_fifo) && (cfg->max_wait_us <= WAIT_MAX_US) &&
-           (cfg->view_tau_ms <= TAU_MAX_MS);
+           (cfg->view_tau_ms <= TAU_MAX_MS) && (cfg->n_warp_events <= FIFO_MAX);
 }
 
 static size_t n_tiles_of(const evs_pipeline_config_t *cfg)

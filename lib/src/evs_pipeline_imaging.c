@@ -2,6 +2,8 @@
  * SPDX-FileCopyrightText: 2026 the evstab authors */
 #include "evs_pipeline_private.h"
 
+#include <string.h>
+
 /* --- settings and memory ------------------------------------------------------------------------------------------ */
 
 /* The settings of the modules, as far as the pipeline decides them. */
@@ -33,22 +35,63 @@ static evs_velocity_config_t velocity_config(const evs_pipeline_config_t *cfg)
     return velocity;
 }
 
-size_t evs_pipeline_imaging_bytes(const evs_pipeline_config_t *cfg)
+static bool warps_afterwards(const evs_pipeline_config_t *cfg)
+{
+    return (cfg->warp == EVS_PIPELINE_WARP_GLOBAL) || (cfg->warp == EVS_PIPELINE_WARP_TILED);
+}
+
+static evs_warp_config_t warp_config(const evs_pipeline_config_t *cfg)
+{
+    evs_warp_config_t warp = cfg->warp_search;
+    warp.kind = (cfg->warp == EVS_PIPELINE_WARP_GLOBAL) ? EVS_WARP_GLOBAL : EVS_WARP_TILED;
+    warp.width_px = cfg->camera.width_px;
+    warp.height_px = cfg->camera.height_px;
+    return warp;
+}
+
+/* Whether the settings that sizes are computed from fit each other; the modules judge the rest. */
+static bool sizes_ok(const evs_pipeline_config_t *cfg)
 {
     const bool image_ok = ((uint32_t)cfg->image >= EVS_PIPELINE_IMAGE_COUNT) &&
                           ((uint32_t)cfg->image <= EVS_PIPELINE_IMAGE_SURFACE) &&
                           ((uint32_t)cfg->iwe.vote <= EVS_IWE_GAUSSIAN);
-    const bool warp_ok =
-        (cfg->warp == EVS_PIPELINE_WARP_NONE) ||
-        ((cfg->warp == EVS_PIPELINE_WARP_PREDICTED) && cfg->velocity_on && (cfg->image != EVS_PIPELINE_IMAGE_SURFACE));
-    if (!image_ok || !warp_ok) { return 0u; }
+    if (!image_ok || ((uint32_t)cfg->warp > EVS_PIPELINE_WARP_TILED)) { return false; }
+    if (cfg->warp == EVS_PIPELINE_WARP_NONE) { return true; }
+    if (cfg->image == EVS_PIPELINE_IMAGE_SURFACE) { return false; }
+    if (cfg->warp == EVS_PIPELINE_WARP_PREDICTED) { return cfg->velocity_on; }
+    const evs_warp_config_t *const warp = &cfg->warp_search;
+    return (cfg->n_warp_events >= 1u) && (warp->n_budget <= EVS_WARP_BUDGET_MAX) && (warp->max_px <= EVS_WARP_MAX_PX) &&
+           (warp->shift <= EVS_WARP_SHIFT_MAX);
+}
+
+size_t evs_pipeline_imaging_bytes(const evs_pipeline_config_t *cfg)
+{
+    if (!sizes_ok(cfg)) { return 0u; }
     const evs_iwe_config_t iwe = iwe_config(cfg);
-    const size_t bytes = EVS_PIPELINE_IMAGE_BYTES(iwe.width_px, iwe.height_px, cfg->image, iwe.vote, cfg->warp,
-                                                  cfg->velocity_on, cfg->n_batch);
+    size_t bytes = EVS_PIPELINE_IMAGE_BYTES(iwe.width_px, iwe.height_px, cfg->image, iwe.vote, cfg->warp,
+                                            cfg->velocity_on, cfg->n_batch);
+    if (warps_afterwards(cfg)) {
+        const evs_warp_config_t *const warp = &cfg->warp_search;
+        bytes += EVS_PIPELINE_WARP_BYTES(iwe.width_px, iwe.height_px, cfg->n_warp_events, warp->n_budget, warp->max_px,
+                                         warp->shift);
+    }
     if (!cfg->velocity_on) { return bytes; }
     const evs_velocity_config_t velocity = velocity_config(cfg);
     const size_t n_velocity = evs_velocity_bytes(&velocity);
     return (n_velocity > 0u) ? bytes + EVS_PIPELINE_PART(n_velocity) : 0u;
+}
+
+static evs_status_t init_warp(evs_pipeline_imaging_t *m, const evs_pipeline_config_t *cfg, unsigned char **cursor)
+{
+    if (cfg->warp == EVS_PIPELINE_WARP_PREDICTED) {
+        m->warped = evs_pipeline_take(cursor, cfg->n_batch * sizeof m->warped[0]);
+    }
+    if (!warps_afterwards(cfg)) { return EVS_OK; }
+    const evs_warp_config_t warp = warp_config(cfg);
+    const size_t n_bytes = EVS_WARP_BYTES(warp.width_px, warp.height_px, warp.n_budget, warp.max_px, warp.shift);
+    m->events = evs_pipeline_take(cursor, cfg->n_warp_events * sizeof m->events[0]);
+    m->warped = evs_pipeline_take(cursor, cfg->n_warp_events * sizeof m->warped[0]);
+    return evs_warp_init(&m->search, &warp, evs_pipeline_take(cursor, n_bytes), n_bytes);
 }
 
 evs_status_t evs_pipeline_imaging_init(evs_pipeline_imaging_t *imaging, const evs_pipeline_config_t *cfg,
@@ -69,9 +112,7 @@ evs_status_t evs_pipeline_imaging_init(evs_pipeline_imaging_t *imaging, const ev
         status = evs_iwe_init(&imaging->iwe, &iwe, imaging->votes, n_bytes);
     }
     if (surface_on || !cfg->velocity_on) { imaging->plane = evs_pipeline_take(cursor, n_px); }
-    if (cfg->warp == EVS_PIPELINE_WARP_PREDICTED) {
-        imaging->warped = evs_pipeline_take(cursor, cfg->n_batch * sizeof imaging->warped[0]);
-    }
+    if (status == EVS_OK) { status = init_warp(imaging, cfg, cursor); }
     if ((status == EVS_OK) && cfg->velocity_on) {
         const evs_velocity_config_t velocity = velocity_config(cfg);
         const size_t n_bytes = evs_velocity_bytes(&velocity);
@@ -99,25 +140,23 @@ static void begin_window(evs_pipeline_t *p, uint32_t t_us)
     evs_pipeline_imaging_t *const m = p->imaging;
     m->empty = false;
     if ((p->cfg.image == EVS_PIPELINE_IMAGE_SURFACE) && p->window_saccade) { evs_surface_clear(&m->surface); }
-    m->t_warp_us = t_us;
+    /* A warp to the middle of the window displaces edges least where the flow is wrong. It is not known yet where that
+     * will be: as late as in the window before. */
+    m->t_warp_us = t_us + m->duration_us / 2u;
     m->warping = (p->cfg.warp == EVS_PIPELINE_WARP_PREDICTED) && p->slice_oriented &&
                  same_rotation(m->flow_q_wr, reference_of(p)) && (evs_flow_grid_n_measured(&m->flow) > 0u);
 }
 
-/* Take points back along the flow to where they were at the beginning of their window. */
-static void warp(evs_pipeline_imaging_t *m, const evs_event_t *ev, const evs_point_t *points, size_t n)
+/* Keep events until the window has closed. */
+static void keep(evs_pipeline_t *p, const evs_event_t *ev, const evs_point_t *points, size_t n)
 {
-    for (size_t i = 0u; i < n; i++) {
-        m->warped[i] = points[i];
-        if (evs_point_is_outside(points[i])) { continue; }
-        const evs_flow_velocity_t flow = evs_flow_grid_at(&m->flow, points[i]);
-        const int32_t back_us = evs_time_diff_us(m->t_warp_us, ev[i].t_us);
-        const int32_t x_q4 = points[i].x_q4 + evs_flow_displacement_q4(flow.x_px_s_q3, back_us);
-        const int32_t y_q4 = points[i].y_q4 + evs_flow_displacement_q4(flow.y_px_s_q3, back_us);
-        const bool inside = (x_q4 >= -EVS_POINT_MAX_Q4) && (x_q4 <= EVS_POINT_MAX_Q4) && (y_q4 >= -EVS_POINT_MAX_Q4) &&
-                            (y_q4 <= EVS_POINT_MAX_Q4);
-        m->warped[i] = inside ? (evs_point_t){(int16_t)x_q4, (int16_t)y_q4} : evs_point_outside();
-    }
+    evs_pipeline_imaging_t *const m = p->imaging;
+    const size_t room = p->cfg.n_warp_events - m->n_kept;
+    const size_t n_new = (n < room) ? n : room;
+    memcpy(&m->events[m->n_kept], ev, n_new * sizeof ev[0]);
+    memcpy(&m->warped[m->n_kept], points, n_new * sizeof points[0]);
+    m->n_kept += n_new;
+    evs_count_add(&p->counts.n_unwarped, n - n_new);
 }
 
 void evs_pipeline_imaging_add(evs_pipeline_t *p, const evs_event_t *ev, const evs_point_t *points, size_t n)
@@ -126,8 +165,10 @@ void evs_pipeline_imaging_add(evs_pipeline_t *p, const evs_event_t *ev, const ev
     if (m->empty) { begin_window(p, ev[0].t_us); }
     if (p->cfg.image == EVS_PIPELINE_IMAGE_SURFACE) {
         evs_surface_add(&m->surface, ev, points, n);
+    } else if (warps_afterwards(&p->cfg)) {
+        keep(p, ev, points, n);
     } else if (m->warping) {
-        warp(m, ev, points, n);
+        evs_warp_map(&m->flow, ev, points, n, m->t_warp_us, m->warped);
         evs_iwe_add(&m->iwe, m->warped, n);
     } else {
         evs_iwe_add(&m->iwe, points, n);
@@ -136,15 +177,36 @@ void evs_pipeline_imaging_add(evs_pipeline_t *p, const evs_event_t *ev, const ev
 
 /* --- images ------------------------------------------------------------------------------------------------------- */
 
+/* Find the flow of the window's events, and let them vote from where it takes them. */
+static void warp_kept(evs_pipeline_imaging_t *m, uint32_t t_us)
+{
+    evs_warp_result_t result;
+    evs_warp_estimate(&m->search, m->events, m->warped, m->n_kept, NULL, &m->flow, &result);
+    evs_warp_map(&m->flow, m->events, m->warped, m->n_kept, t_us, m->warped);
+    evs_iwe_add(&m->iwe, m->warped, m->n_kept);
+}
+
+/*
+ * The time that an image belongs to: what its events were warped to, or the middle of the window. Where all its events were
+ * rotated as the first one, a warp must take them back to that one's time: rotation is part of the flow then.
+ */
+static uint32_t image_time(const evs_pipeline_t *p, const evs_window_end_t *end)
+{
+    if (p->imaging->warping) { return p->imaging->t_warp_us; }
+    const bool first = warps_afterwards(&p->cfg) && (p->cfg.stabilize.rotation == EVS_ROTATION_WINDOW);
+    return first ? end->t_first_us : end->t_first_us + (end->t_last_us - end->t_first_us) / 2u;
+}
+
 static void render(evs_pipeline_t *p, const evs_window_end_t *end, uint8_t *plane, evs_pipeline_chunk_t *chunk)
 {
     evs_pipeline_imaging_t *const m = p->imaging;
     const uint32_t duration_us = end->t_last_us - end->t_first_us;
-    chunk->image_t_us = m->warping ? m->t_warp_us : end->t_first_us + duration_us / 2u;
+    chunk->image_t_us = image_time(p, end);
     if (p->cfg.image == EVS_PIPELINE_IMAGE_SURFACE) {
         evs_surface_end_window(&m->surface, duration_us);
         evs_surface_render(&m->surface, end->t_last_us, plane);
     } else {
+        if (warps_afterwards(&p->cfg)) { warp_kept(m, chunk->image_t_us); }
         evs_iwe_render(&m->iwe, plane);
     }
     chunk->image = (evs_image_t){plane, p->cfg.camera.width_px, p->cfg.camera.height_px};
@@ -155,9 +217,11 @@ static void render(evs_pipeline_t *p, const evs_window_end_t *end, uint8_t *plan
 static void begin_velocity(evs_pipeline_t *p, const evs_pipeline_chunk_t *chunk)
 {
     evs_pipeline_imaging_t *const m = p->imaging;
-    /* The flow of the last pair is final now, whenever its steps were made: the next window may be warped by it. */
-    m->flow = m->velocity.grid;
-    m->flow_q_wr = m->velocity.grid_q_wr;
+    if (p->cfg.warp == EVS_PIPELINE_WARP_PREDICTED) {
+        /* The flow of the last pair is final now, whenever its steps were made: the next window may be warped by it. */
+        m->flow = m->velocity.grid;
+        m->flow_q_wr = m->velocity.grid_q_wr;
+    }
     const evs_velocity_image_t image = {.px = chunk->image.px, .t_us = chunk->image_t_us, .q_wr = reference_of(p)};
     uint8_t *const scratch = (m->plane != NULL) ? m->plane : m->votes; /* the votes have been rendered */
     const evs_status_t status = evs_velocity_begin(&m->velocity, &image, scratch);
@@ -187,6 +251,8 @@ void evs_pipeline_imaging_finish(evs_pipeline_t *p, evs_pipeline_chunk_t *chunk)
         if (p->cfg.image == EVS_PIPELINE_IMAGE_SURFACE) { evs_surface_clear(&m->surface); }
         if (p->cfg.velocity_on) { evs_velocity_reset(&m->velocity); }
     }
+    if (!m->empty) { m->duration_us = chunk->end.t_last_us - chunk->end.t_first_us; }
+    m->n_kept = 0u;
     m->empty = true;
 }
 

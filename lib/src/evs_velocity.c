@@ -33,7 +33,7 @@ evs_velocity_config_t evs_velocity_config_default(const evs_pinhole_t *pinhole)
                                  .orientation_spacing_us = 5000u,
                                  .track = evs_orientation_track_config_default()};
     /* Windows of 31 px on cells of 16 px overlap, so that four of them err alike; and each blends depths. Measured. */
-    cfg.egomotion.variance_factor_q8 = 8u * 256u;
+    cfg.egomotion.variance_factor_q8 = 1664u; /* 6.5 */
     return cfg;
 }
 

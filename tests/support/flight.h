@@ -23,18 +23,24 @@ static size_t flight_n_dots;
 static double flight_mover_v[3];
 
 /* Dots in all directions up to 65 degrees to the sides and 50 up and down, at 1.5 to 3.5 m. */
-static inline void flight_make_wall(size_t n_dots)
+static inline double flight_uniform(uint32_t *seed, double lo, double hi)
+{
+    *seed = *seed * 1664525u + 1013904223u;
+    return lo + (hi - lo) * (double)(*seed >> 8) / 16777216.0;
+}
+
+static inline void flight_make_wall(size_t n_dots, uint32_t seed)
 {
     flight_n_dots = n_dots;
     for (size_t i = 0u; i < n_dots; i++) {
-        const double azimuth = model_uniform(-1.13, 1.13);
-        const double elevation = model_uniform(-0.87, 0.87);
+        const double azimuth = flight_uniform(&seed, -1.13, 1.13);
+        const double elevation = flight_uniform(&seed, -0.87, 0.87);
         const double depth = 2.5 + 0.6 * sin(2.2 * azimuth + 0.5) + 0.4 * cos(3.1 * elevation);
         flight_dot_t *const dot = &flight_dots[i];
         dot->at[0] = depth * tan(azimuth / 1.2);
         dot->at[1] = depth * tan(elevation / 1.2);
         dot->at[2] = depth;
-        dot->grey = (int32_t)model_uniform(60.0, 200.0);
+        dot->grey = (int32_t)flight_uniform(&seed, 60.0, 200.0);
         dot->mover = false;
     }
 }

@@ -20,7 +20,8 @@ static evs_pinhole_t pinhole;
 
 static void init(void)
 {
-    const evs_keyframes_config_t cfg = evs_keyframes_config_default(&pinhole);
+    evs_keyframes_config_t cfg = evs_keyframes_config_default(&pinhole);
+    cfg.baseline_min_us = 30u * MS;
     TEST_ASSERT_EQUAL_INT(EVS_OK, evs_keyframes_init(&k, &cfg, memory, N_BYTES));
 }
 

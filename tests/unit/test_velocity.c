@@ -52,7 +52,7 @@ void setUp(void)
                               .fy_q16 = evs_q_from_double(FOCAL, 16),
                               .cx_q16 = evs_q_from_double((W - 1) / 2.0, 16),
                               .cy_q16 = evs_q_from_double((H - 1) / 2.0, 16)};
-    flight_make_wall(N_DOTS);
+    flight_make_wall(N_DOTS, 1u);
     v_w[0] = 0.8;
     v_w[1] = 0.1;
     v_w[2] = 0.4;
@@ -225,14 +225,14 @@ static void test_no_motion_and_rotation_alone_are_flagged(void)
 
 static void test_no_texture_and_five_dots_are_flagged(void)
 {
-    flight_make_wall(0u);
+    flight_make_wall(0u, 1u);
     fly(10u);
     assert_none_valid();
     for (size_t i = 0u; i < n_results; i++) {
         TEST_ASSERT_BITS_HIGH(EVS_VELOCITY_FEW, results[i].flags);
         TEST_ASSERT_EQUAL_UINT16(0u, results[i].n_flow);
     }
-    flight_make_wall(5u);
+    flight_make_wall(5u, 1u);
     for (size_t i = 0u; i < 5u; i++) { /* all in view */
         flight_dots[i].at[0] = -0.6 + 0.3 * (double)i;
         flight_dots[i].at[1] = ((i & 1u) != 0u) ? 0.3 : -0.3;
@@ -251,7 +251,7 @@ static void test_no_texture_and_five_dots_are_flagged(void)
 static void test_images_that_have_nothing_in_common_are_flagged(void)
 {
     for (unsigned i = 0u; i < 12u; i++, t_now_us += STEP_US) {
-        flight_make_wall(N_DOTS); /* other dots every time */
+        flight_make_wall(N_DOTS, 100u + i); /* other dots every time */
         see();
         work();
     }
@@ -303,7 +303,7 @@ static void test_predicted_flow_follows_the_reference(void)
     cfg.keyframes.baseline_min_us = 120u * MS;
     cfg.keyframes.baseline_first_us = 120u * MS;
     init(&cfg);
-    flight_make_wall(N_DOTS);
+    flight_make_wall(N_DOTS, 1u);
     fly(1u);
     velocity.grid_q_wr = model_to_fixed(reference);
     evs_flow_grid_set_all(&velocity.grid, (evs_flow_velocity_t){(int16_t)(-8 * 120), 0});

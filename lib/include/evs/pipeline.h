@@ -42,6 +42,7 @@
 #include "evs/tiles.h"
 #include "evs/undistort.h"
 #include "evs/velocity.h"
+#include "evs/warp.h"
 #include "evs/window.h"
 
 #ifdef __cplusplus
@@ -63,10 +64,12 @@ typedef enum {
     EVS_PIPELINE_IMAGE_SURFACE = 3 /**< Time surface, evs/surface.h. */
 } evs_pipeline_image_t;
 
-/** How the points of a window are moved along the flow, to the middle of the window, before they are voted. */
+/** How the points of a window are moved along the flow, all to one time, before they are voted. */
 typedef enum {
     EVS_PIPELINE_WARP_NONE = 0,
-    EVS_PIPELINE_WARP_PREDICTED = 1 /**< By the flow of an image pair before: streaming. Needs velocity_on. */
+    EVS_PIPELINE_WARP_PREDICTED = 1, /**< By the flow of an image pair before: streaming. Needs velocity_on. */
+    EVS_PIPELINE_WARP_GLOBAL = 2, /**< By the one flow that makes the window sharpest; needs all its events at once. */
+    EVS_PIPELINE_WARP_TILED = 3   /**< By such a flow per tile; needs all its events at once. */
 } evs_pipeline_warp_t;
 
 typedef struct {                /** Settings; copied by evs_pipeline_init(). */
@@ -95,8 +98,12 @@ typedef struct {                /** Settings; copied by evs_pipeline_init(). */
     evs_iwe_config_t iwe;                 /**< Image COUNT, IWE; its size is set from the camera. */
     evs_surface_config_t surface;         /**< Image SURFACE; its size is set from the camera. */
     evs_pipeline_warp_t warp;             /**< Image COUNT, IWE. Default NONE. */
-    bool velocity_on;                     /**< Measure the direction of flight; needs an image. Default false. */
-    evs_velocity_config_t velocity;       /**< Its pinhole is set from the camera, its time offset from the track. */
+    evs_warp_config_t warp_search;        /**< Warp GLOBAL, TILED: its kind and size are set by init. Default that of
+                                               evs/warp.h for TILED. */
+    size_t n_warp_events;           /**< Warp GLOBAL, TILED: events of a window that are kept, [1, 2^24]. Those that
+                                               are too many are left out of the image, and counted. Default 0. */
+    bool velocity_on;               /**< Measure the direction of flight; needs an image. Default false. */
+    evs_velocity_config_t velocity; /**< Its pinhole is set from the camera, its time offset from the track. */
 } evs_pipeline_config_t;
 
 /** A run of consecutive events of one window. The arrays stay valid until the next call with this context. */
@@ -124,6 +131,7 @@ typedef struct {
     uint32_t n_orientations_back; /**< Orientations (gyro samples) dropped: time ran back. */
     uint32_t n_images;            /**< Images made. */
     uint32_t n_images_incomplete; /**< Windows without an image: flushed, restarted, or orientation unknown. */
+    uint32_t n_unwarped;          /**< Events left out of an image: n_warp_events were kept already. */
     uint32_t n_images_busy;       /**< Windows without an image: velocity was still at work on the one before. */
 } evs_pipeline_counts_t;
 
@@ -132,14 +140,18 @@ typedef struct
     evs_iwe_t iwe;
     evs_surface_t surface;
     evs_velocity_t velocity;
+    evs_warp_t search;
     evs_flow_grid_t flow; /* what the open window is warped by */
     evs_quat_t flow_q_wr; /* the reference that it is seen from */
     uint8_t *plane;       /* of the image, or for turning keyframes */
     uint8_t *votes;       /* the memory of the IWE */
-    evs_point_t *warped;
-    uint32_t t_warp_us; /* the time to which the open window is warped */
-    bool warping;       /* the open window is being warped */
-    bool empty;         /* no event of the open window has been voted yet */
+    evs_point_t *warped;  /* a batch, or the points of a window */
+    evs_event_t *events;  /* of that window */
+    size_t n_kept;        /* of them */
+    uint32_t duration_us; /* of the window before */
+    uint32_t t_warp_us;   /* the time to which the open window is warped */
+    bool warping;         /* the open window is being warped */
+    bool empty;           /* no event of the open window has been voted yet */
 } evs_pipeline_imaging_t;
 
 typedef struct { /** Context. A complete type only so that you can place it: every member is private. */
@@ -198,7 +210,7 @@ typedef struct { /** Context. A complete type only so that you can place it: eve
 /**
  * What to add for images. A constant expression.
  * @p image, @p warp, @p velocity_on as in the settings; @p vote and @p n_batch as there, too. With velocity_on EVS_VELOCITY_BYTES()
- * comes on top.
+ * comes on top, and for the warps GLOBAL and TILED EVS_PIPELINE_WARP_BYTES().
  */
 #define EVS_PIPELINE_IMAGE_BYTES(width_px, height_px, image, vote, warp, velocity_on, n_batch)                         \
     (EVS_PIPELINE_PART(sizeof(evs_pipeline_imaging_t)) +                                                               \
@@ -207,6 +219,12 @@ typedef struct { /** Context. A complete type only so that you can place it: eve
      EVS_PIPELINE_PART(                                                                                                \
          ((velocity_on) && ((image) != EVS_PIPELINE_IMAGE_SURFACE)) ? 0u : EVS_IMAGE_BYTES(width_px, height_px)) +     \
      EVS_PIPELINE_PART(((warp) == EVS_PIPELINE_WARP_PREDICTED) ? (n_batch) * sizeof(evs_point_t) : 0u))
+
+/** What to add for the warps GLOBAL and TILED; the last three as in warp_search. A constant expression. */
+#define EVS_PIPELINE_WARP_BYTES(width_px, height_px, n_warp_events, n_budget, max_px, shift)                           \
+    (EVS_PIPELINE_PART((n_warp_events) * sizeof(evs_event_t)) +                                                        \
+     EVS_PIPELINE_PART((n_warp_events) * sizeof(evs_point_t)) +                                                        \
+     EVS_PIPELINE_PART(EVS_WARP_BYTES(width_px, height_px, n_budget, max_px, shift)))
 
 /** What to add for evs_pipeline_config_velocity() as it is: images of warped events and the direction of flight. */
 #define EVS_PIPELINE_VELOCITY_BYTES(width_px, height_px)                                                               \
