@@ -31,8 +31,10 @@ static const evt_option_t OPTIONS[] = {
      "When a window of events closes:\n"
      "area:COLSxROWS:N  a tile of the image has more than N events;\n"
      "count:N           N events; time:US  US microseconds.\n"
-     "Default: area:34x26:N, N being 36 events per pixel of a\n"
-     "tile, but after 5 ms at the earliest and 50 at the latest.",
+     "area and count with :MIN-MAX close after MIN ms at the\n"
+     "earliest and after MAX at the latest, as 500:5-50 does.\n"
+     "Default: area:34x26:N:5-50, N being 12 events per pixel\n"
+     "of a tile: 504 at 240x180.",
      &opt.window, NULL},
     {"rotation", '\0', "MODE",
      "slice: follow the attitude within a window (default);\nwindow: one rotation per window, as the paper.",

@@ -38,17 +38,37 @@ static void no_limits(evs_window_config_t *w)
     w->max_duration_us = EVS_WINDOW_DURATION_MAX_US;
 }
 
-/* "area:34x26:200", "count:30000", "time:10000" */
+/* "200" or "200:5-50": the number, and the shortest and longest duration in ms. */
+static bool parse_threshold(const char *text, int64_t most, evs_window_config_t *w)
+{
+    const char *const end = text + strlen(text);
+    bool exact = false;
+    int64_t value = 0;
+    int64_t low_us = 0;
+    int64_t high_us = EVS_WINDOW_DURATION_MAX_US;
+    if (!evh_decimal_parse(&text, end, 0, &value, &exact) || !exact || (value < 1) || (value > most)) { return false; }
+    if (text != end) {
+        if (*text++ != ':') { return false; }
+        if (!evh_decimal_parse(&text, end, 3, &low_us, NULL) || (text == end) || (*text++ != '-')) { return false; }
+        if (!evh_decimal_parse(&text, end, 3, &high_us, NULL) || (text != end)) { return false; }
+        if ((low_us < 0) || (high_us < 1) || (high_us < low_us) || (high_us > (int64_t)EVS_WINDOW_DURATION_MAX_US)) {
+            return false;
+        }
+    }
+    w->threshold = (uint32_t)value;
+    w->min_duration_us = (uint32_t)low_us;
+    w->max_duration_us = (uint32_t)high_us;
+    return true;
+}
+
+/* "area:34x26:200", "area:34x26:500:5-50", "count:30000", "time:10000" */
 static bool parse_window(const char *text, evs_pipeline_config_t *p)
 {
     char size[24];
     int64_t value = 0;
-    no_limits(&p->window);
     if (strncmp(text, "count:", 6u) == 0) {
-        if (!evt_parse_int(text + 6, 1, EVS_WINDOW_COUNT_MAX, &value)) { return false; }
         p->window.kind = EVS_WINDOW_COUNT;
-        p->window.threshold = (uint32_t)value;
-        return true;
+        return parse_threshold(text + 6, EVS_WINDOW_COUNT_MAX, &p->window);
     }
     if (strncmp(text, "time:", 5u) == 0) {
         if (!evt_parse_int(text + 5, 1, EVS_WINDOW_DURATION_MAX_US, &value)) { return false; }
@@ -61,21 +81,20 @@ static bool parse_window(const char *text, evs_pipeline_config_t *p)
         if ((length >= sizeof size) || (text[5u + length] != ':')) { return false; }
         memcpy(size, text + 5, length);
         size[length] = '\0';
-        if (!evt_parse_size(size, &p->n_cols, &p->n_rows) ||
-            !evt_parse_int(text + 6u + length, 1, EVS_WINDOW_AREA_MAX, &value)) {
-            return false;
-        }
         p->window.kind = EVS_WINDOW_AREA;
-        p->window.threshold = (uint32_t)value;
-        return true;
+        return evt_parse_size(size, &p->n_cols, &p->n_rows) &&
+               parse_threshold(text + 6u + length, EVS_WINDOW_AREA_MAX, &p->window);
     }
     return false;
 }
 
 static void apply_config_window(const evh_config_t *c, evs_pipeline_config_t *p)
 {
+    const uint64_t n_before = (uint64_t)p->n_cols * p->n_rows;
     if (c->has_columns) { p->n_cols = (uint16_t)c->n_columns; }
-    if ((c->window_kind != EVH_WINDOW_UNSET) || c->has_roi_threshold) { no_limits(&p->window); }
+    if ((c->window_kind == EVH_WINDOW_COUNT) || (c->window_kind == EVH_WINDOW_TIME) || c->has_roi_threshold) {
+        no_limits(&p->window);
+    }
     if (c->has_rows) { p->n_rows = (uint16_t)c->n_rows; }
     switch (c->window_kind) {
     case EVH_WINDOW_COUNT:
@@ -89,6 +108,12 @@ static void apply_config_window(const evh_config_t *c, evs_pipeline_config_t *p)
         break;
     case EVH_WINDOW_UNSET:
         break;
+    }
+    if ((p->window.kind == EVS_WINDOW_AREA) && !c->has_roi_threshold) { /* As many events per pixel of a tile. */
+        const uint64_t scaled = p->window.threshold * n_before / ((uint64_t)p->n_cols * p->n_rows);
+        p->window.threshold = (uint32_t)((scaled < 1u)                    ? 1u
+                                         : (scaled > EVS_WINDOW_AREA_MAX) ? EVS_WINDOW_AREA_MAX
+                                                                          : scaled);
     }
     if ((p->window.kind == EVS_WINDOW_AREA) && c->has_roi_threshold) {
         p->window.threshold =
@@ -264,7 +289,7 @@ static bool settle_window(evt_replay_t *r, const evt_replay_options_t *o, const 
     apply_config_window(config, p);
     if ((o->window != NULL) && !parse_window(o->window, p)) {
         return usage(usage_fault, err, "--window", o->window,
-                     "area:COLSxROWS:EVENTS, count:EVENTS or time:MICROSECONDS");
+                     "area:COLSxROWS:EVENTS, count:EVENTS, either with :MIN-MAX in ms, or time:MICROSECONDS");
     }
     if ((p->n_cols > r->calib.width_px) || (p->n_rows > r->calib.height_px) ||
         ((uint32_t)p->n_cols * p->n_rows > EVS_TILES_MAX)) {
@@ -378,7 +403,7 @@ static bool check_words(const evt_replay_options_t *o, bool *usage_fault, evh_er
     }
     if ((o->window != NULL) && !parse_window(o->window, &pipeline)) {
         return usage(usage_fault, err, "--window", o->window,
-                     "area:COLSxROWS:EVENTS, count:EVENTS or time:MICROSECONDS");
+                     "area:COLSxROWS:EVENTS, count:EVENTS, either with :MIN-MAX in ms, or time:MICROSECONDS");
     }
     if ((o->saccade != NULL) && !evt_parse_on_off(o->saccade, &on)) {
         return usage(usage_fault, err, "--saccade", o->saccade, "on or off");

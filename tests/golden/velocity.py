@@ -197,7 +197,73 @@ def test_slider(evstab, temp):
     print(f"     {run.summary['velocity']}")
 
 
-TESTS = {"truth": test_truth, "order": test_order, "imu": test_imu, "slider": test_slider}
+class Truth:
+    """Recorded poses, whose clock may run ahead of the events' by a few ms."""
+
+    def __init__(self, path):
+        table = model.read_table(path)
+        self.t, self.p, self.q = table[:, 0], table[:, 1:4], table[:, [7, 4, 5, 6]]
+
+    def velocity(self, t):
+        """In the camera's frame: the slope of a parabola over 50 ms of positions."""
+        near = np.abs(self.t - t) < 0.025
+        fit = np.polyfit(self.t[near] - t, self.p[near], 2)
+        now = self.q[np.argmin(np.abs(self.t - t))]
+        return model.matrix(model.conjugate(now)) @ fit[1]
+
+    def rate(self, t):
+        near = np.flatnonzero(np.abs(self.t - t) < 0.02)
+        turned = model.multiply(model.conjugate(self.q[near[0]]), self.q[near[-1]])
+        return model.logarithm(turned) / (self.t[near[-1]] - self.t[near[0]])
+
+
+# Recording, events, settings, and by how much the clock of its truth may be off (ms). So short a recording needs short
+# windows and intervals.
+WINDOWS = [("poster_translation", "events_39.127-39.200.txt", (), 30),
+           ("boxes_translation", "events_18.580-18.591.txt", ("--window", "area:34x26:100", "--baseline-ms", "4:100"), 30),
+           ("poster_6dof", "events_36.567-36.571.txt", ("--window", "area:34x26:60", "--baseline-ms", "1:100"), 0)]
+
+
+def test_windows(evstab, temp):
+    calib = DATA / "ecd" / "calib.txt"
+    need(calib, *(DATA / "ecd" / name / events for name, events, _, _ in WINDOWS))
+    focal = model.read_table(calib)[0][0]
+    for name, events, words, clock_ms in WINDOWS:
+        poses = DATA / "ecd" / name / "groundtruth.txt"
+        truth = Truth(poses)
+        found = {}
+        for offset_ms in range(-clock_ms, clock_ms + 1, 5):
+            run = Run(evstab, temp / f"{name} {offset_ms}", DATA / "ecd" / name / events, "--calib", calib, "--poses", poses,
+                      "--attitude", "truth", "--imu-offset-us", offset_ms * 1000, *words)
+            if len(run.t) == 0:
+                continue
+            at = run.t - offset_ms * 1e-3
+            error = angle(run.v, np.array([truth.velocity(t) for t in at]))
+            pairs = [row.split(",") for row in (temp / f"{name} {offset_ms}" / "pairs.csv").read_text().splitlines()[1:]]
+            speed = np.median([float(p[3]) / float(p[1]) for p in pairs if p[2] == "valid"]) / focal  # rad/s of image motion
+            # What the truth itself leaves open: a clock that is off turns the flow by the change of the rate, and the
+            # direction with it.
+            shifts = [k * 5e-3 for k in range(-clock_ms // 5, clock_ms // 5 + 1)]
+            t = float(np.median(at))
+            change = max(float(np.linalg.norm(truth.rate(t + s) - truth.rate(t))) for s in shifts)
+            drift = max(float(angle(truth.velocity(t + s)[None], truth.velocity(t)[None])[0]) for s in shifts)
+            known = np.degrees(np.arctan(change / speed)) + drift
+            found[offset_ms] = (float(np.median(error)), float(np.median(run.sigma)), known, len(run.t))
+        print(f"     {name}: " + ", ".join(f"{k:+d} ms: {v[0]:.1f} deg of {v[3]}, sigma {v[1]:.1f}, truth known to {v[2]:.1f}"
+                                           for k, v in found.items()))
+        check(f"{name}: there is a direction at the nominal time", 0 in found, sorted(found))
+        if 0 not in found:
+            continue
+        error, sigma, known, _ = found[0]
+        check(f"{name}: within the error of the truth and twice its own", error <= known + 2 * sigma,
+              f"{error:.1f}, truth {known:.1f}, sigma {sigma:.1f} deg")
+        best = min(found, key=lambda k: found[k][0])
+        bound = 12.0 if clock_ms > 0 else 20.0
+        check(f"{name}: right for some clock within {clock_ms} ms", found[best][0] <= bound,
+              f"{found[best][0]:.1f} deg at {best:+d} ms, at most {bound:.0f}")
+
+
+TESTS = {"truth": test_truth, "order": test_order, "imu": test_imu, "slider": test_slider, "windows": test_windows}
 
 
 def main():

@@ -112,7 +112,8 @@ def test_usage():
     for unknown in ("--writ=events", "--i"):
         expect("an unknown option", ["replay", "x", "-o", "y", unknown], 2, "unknown option", n_lines=1)
     for option, value in (("--window", "area:34x26"), ("--window", "count:0"), ("--window", "time:1.5"), ("--window", "roi:1"),
-                          ("--window", "area:0x26:200"), ("--window", "area:34x26:99999"), ("--rotation", "both"),
+                          ("--window", "area:0x26:200"), ("--window", "area:34x26:99999"), ("--window", "area:34x26:500:50-5"), ("--window", "area:34x26:500:5"),
+                          ("--window", "count:100:5-"), ("--window", "count:100:5-9x"), ("--window", "time:100:5-9"), ("--rotation", "both"),
                           ("--saccade", "1"), ("--attitude", "magic"), ("--imu-offset-us", "1ms"), ("--imu-offset-us", "99999999"),
                           ("--from", "now"), ("--to", ""), ("--size", "240"), ("--size", "240x0"), ("--size", "4096x4096"),
                           ("--write", "pictures"), ("--write", "events,"), ("--write", "events;frames"), ("--image", "none"), ("--image", "iw"),
@@ -168,12 +169,20 @@ def test_replay():
     expect("units of g are noticed", ["replay", recording("in_g", imu_txt=imu().replace("-9.7", "-0.99")), "-o", "out/g"], 0, "not about 9.8")
 
     expect("count windows", ["replay", folder, "-o", "out/c", "--window", "count:100"], 0, ">20 windows")
+    expect("count windows within limits", ["replay", folder, "-o", "out/c", "--window", "count:100:0-5.5"], 0, ">37 windows")
+    c = summary("out/c")["settings"]
+    check("limits are told", (c["window"], c["window_min_us"], c["window_max_us"]) == ("count:100", 0, 5500), c)
     expect("time windows", ["replay", folder, "-o", "out/tw", "--window", "time:50000"], 0, ">4 windows")
     expect("part of it", ["replay", folder, "-o", "out/part", "--from", "1.05", "--to", "1.1"], 0, ">500 events")
     check("what was left out is counted", summary("out/part")["events"]["before_from"] == 500, summary("out/part")["events"])
     expect("none of it", ["replay", folder, "-o", "out/none_of_it", "--from", "5"], 1, "no event between", n_lines=1)
     check("no litter", not (ROOT / "out/none_of_it").exists())
     expect("paper", ["replay", folder, "-o", "out/p", "--paper"], 0)
+    s = summary("out/a/b")["settings"]
+    check("default window", (s["window"], s["window_min_us"], s["window_max_us"]) == ("area:34x26:504", 5000, 50000), s)
+    write("tiles.yaml", "number_of_columns: 17\nnumber_of_rows: 13\n")
+    expect("larger tiles", ["replay", folder, "-o", "out/tiles", "--config", "tiles.yaml"], 0)
+    check("hold more events", summary("out/tiles")["settings"]["window"] == "area:17x13:2016", summary("out/tiles")["settings"])
     p = summary("out/p")["settings"]
     check("paper", (p["rotation"], p["window"], p["saccade_px"]) == ("window", "area:34x26:200", 40), p)
     expect("paper on another sensor", ["replay", folder, "-o", "out/p", "--paper", "--size", "346x260"], 0)
