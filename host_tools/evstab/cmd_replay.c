@@ -14,6 +14,8 @@
 #include "replay.h"
 #include "replay_batch.h"
 
+#define WINDOW_LONG_US 100000 /* Of an image that shall be tracked. */
+
 static evt_replay_options_t opt;
 static const char *opt_jobs;
 static bool opt_quiet;
@@ -143,6 +145,11 @@ static void report(const evt_replay_t *r, const evt_replay_options_t *o, const e
     if (r->rec.poses != NULL) { evh_tally_report(&x->poses_tally, evh_path_name(r->rec.poses)); }
     report_unoriented(x);
     evt_note_attitude_faults(&x->attitude_faults);
+    if (r->pipeline.velocity_on && (x->window_longest_us > WINDOW_LONG_US)) {
+        evh_note("windows last up to %.0f ms, too long to measure the direction of flight often and in sharp images; "
+                 "--window area:...:N:5-50 limits them",
+                 1e-3 * (double)x->window_longest_us);
+    }
     if (r->velocity_told && (x->velocity.n_valid == 0u)) {
         evh_note("no direction of flight: %" PRIu64 " images, %" PRIu64
                  " pairs of them; pairs.csv tells what was in the way",

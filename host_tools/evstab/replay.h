@@ -74,6 +74,7 @@ typedef struct {
     uint64_t n_unoriented;
     uint64_t n_out_of_range; /**< Rotated out of what a point can hold, or behind the camera. */
     uint64_t n_windows, n_saccades;
+    int64_t window_longest_us;
     uint64_t n_orientations;
     int64_t t_first_us, t_last_us;
     int64_t orientation_first_us, orientation_last_us; /**< By the events' clock. */

@@ -163,6 +163,8 @@ static void take_chunk(run_t *run, const evs_pipeline_chunk_t *chunk)
     }
     if (chunk->end.reason != EVS_WINDOW_OPEN) {
         run->window_empty = true;
+        const int64_t length_us = run->window_last_us - run->window_first_us;
+        if (length_us > run->result->window_longest_us) { run->result->window_longest_us = length_us; }
         run->result->n_windows++;
         run->result->n_saccades += chunk->saccade ? 1u : 0u;
         if (!evt_velocity_log_window(&run->velocity, chunk, run->window_last_us, run->err)) { run->failed = true; }

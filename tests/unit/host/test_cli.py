@@ -301,6 +301,9 @@ def test_velocity():
         check(f"{name}: the same directions", [row[1:] for row in other[1:]] == [row.split(",")[1:] for row in rows[1:]])
         check(f"{name}: at their own times", abs(float(other[1][0]) - t0 - (table[0][0] - 1)) < 2e-6, (other[1][0], table[0][0]))
 
+    expect("windows too long", ["replay", "flight", "-o", "out/long_w", "--window", "time:150000"], 0, "windows last up to 150 ms")
+    check("are no matter otherwise", "last up to" not in expect("no velocity", ["replay", "flight", "-o", "out/long_w", "--window", "time:150000",
+                                                                              "--velocity", "off"], 0).stderr)
     kinds = {}
     for words in (["--image", "surface"], ["--image", "count"], ["--warp", "predicted"], ["--baseline-ms", "20:40"], ["--rotation", "window"]):
         key = " ".join(words)
