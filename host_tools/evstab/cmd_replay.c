@@ -155,6 +155,10 @@ static void report(const evt_replay_t *r, const evt_replay_options_t *o, const e
                  " pairs of them; pairs.csv tells what was in the way",
                  (uint64_t)x->counts.n_images, x->velocity.n_pairs);
     }
+    if (x->counts.n_unwarped > 0u) {
+        evh_note("%" PRIu64 " events are not in the images: a window held more than the %zu that a warp keeps",
+                 (uint64_t)x->counts.n_unwarped, r->pipeline.n_warp_events);
+    }
     if (x->n_no_undistorted + x->n_out_of_range > 0u) {
         evh_note("%" PRIu64 " of %" PRIu64 " events have no position: %" PRIu64 " under the lens model, %" PRIu64
                  " rotated out of range",

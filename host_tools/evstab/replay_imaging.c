@@ -7,13 +7,19 @@
 #include "decimal.h"
 #include "options.h"
 
+/* Events of a window that a warp by search can keep: more than windows by area hold. */
+#define N_WARP_EVENTS ((size_t)1u << 18)
+
 #define BASELINE_MAX_US 2000000
 
 static const char *const IMAGES[] = {[EVS_PIPELINE_IMAGE_NONE] = "none",
                                      [EVS_PIPELINE_IMAGE_COUNT] = "count",
                                      [EVS_PIPELINE_IMAGE_IWE] = "iwe",
                                      [EVS_PIPELINE_IMAGE_SURFACE] = "surface"};
-static const char *const WARPS[] = {[EVS_PIPELINE_WARP_NONE] = "none", [EVS_PIPELINE_WARP_PREDICTED] = "predicted"};
+static const char *const WARPS[] = {[EVS_PIPELINE_WARP_NONE] = "none",
+                                    [EVS_PIPELINE_WARP_PREDICTED] = "predicted",
+                                    [EVS_PIPELINE_WARP_GLOBAL] = "global",
+                                    [EVS_PIPELINE_WARP_TILED] = "tiled"};
 static const char *const METHODS[] = {
     [EVS_EGOMOTION_ROBUST] = "erlv", [EVS_EGOMOTION_PAPER] = "erlv-paper", [EVS_EGOMOTION_ERL] = "erl"};
 
@@ -65,7 +71,7 @@ bool evt_imaging_check_words(const evt_replay_options_t *o, bool *usage_fault, e
         return usage(usage_fault, err, "--image", o->image, "iwe, surface or count");
     }
     if ((o->warp != NULL) && (find(WARPS, 0u, N_WARPS, o->warp) == N_WARPS)) {
-        return usage(usage_fault, err, "--warp", o->warp, "none or predicted");
+        return usage(usage_fault, err, "--warp", o->warp, "none, global, tiled or predicted");
     }
     if ((o->method != NULL) && (find(METHODS, 0u, N_METHODS, o->method) == N_METHODS)) {
         return usage(usage_fault, err, "--method", o->method, "erlv, erlv-paper or erl");
@@ -82,6 +88,7 @@ bool evt_imaging_check_words(const evt_replay_options_t *o, bool *usage_fault, e
 
 void evt_imaging_paper(evs_pipeline_config_t *p)
 {
+    p->warp = EVS_PIPELINE_WARP_TILED;
     p->iwe.vote = EVS_IWE_GAUSSIAN;
     p->iwe.smooth = false; /* The Gaussian is smooth. */
     (void)p;
@@ -146,5 +153,10 @@ bool evt_imaging_settle(evt_replay_t *r, const evt_replay_options_t *o, const ev
         return usage(usage_fault, err, "--warp", "predicted", "another without --velocity on, whose flow it goes by");
     }
     p->warp = (evs_pipeline_warp_t)warp;
+    if ((warp == EVS_PIPELINE_WARP_GLOBAL) || (warp == EVS_PIPELINE_WARP_TILED)) {
+        p->warp_search = evs_warp_config_default((warp == EVS_PIPELINE_WARP_GLOBAL) ? EVS_WARP_GLOBAL : EVS_WARP_TILED,
+                                                 r->calib.width_px, r->calib.height_px);
+        p->n_warp_events = N_WARP_EVENTS;
+    }
     return true;
 }

@@ -70,8 +70,10 @@ static void add_window(cJSON *to, const evs_pipeline_config_t *p)
 
 static void add_imaging(cJSON *to, const evs_pipeline_config_t *p)
 {
+    const bool searches = (p->warp == EVS_PIPELINE_WARP_GLOBAL) || (p->warp == EVS_PIPELINE_WARP_TILED);
     evt_json_text(to, "image", evt_image_name(p->image));
     evt_json_text(to, "warp", evt_warp_name(p->warp));
+    if (searches) { evt_json_count(to, "warp_events_max", p->n_warp_events); }
     evt_json_text(to, "velocity", p->velocity_on ? "on" : "off");
     if (!p->velocity_on) { return; }
     evt_json_text(to, "method", evt_method_name(p->velocity.egomotion.method));
@@ -157,6 +159,7 @@ static void add_images(cJSON *root, const evt_replay_t *r, const evt_replay_resu
     left_out = cJSON_AddObjectToObject(images, "left_out");
     evt_json_count(left_out, "no_orientation_or_cut_off", x->counts.n_images_incomplete);
     evt_json_count(left_out, "velocity_at_work", x->counts.n_images_busy);
+    if (p->n_warp_events > 0u) { evt_json_count(images, "events_beyond_warp_events_max", x->counts.n_unwarped); }
 }
 
 static void add_velocity(cJSON *root, const evt_replay_t *r, const evt_replay_result_t *x)
