@@ -305,7 +305,7 @@ def test_velocity():
     check("are no matter otherwise", "last up to" not in expect("no velocity", ["replay", "flight", "-o", "out/long_w", "--window", "time:150000",
                                                                               "--velocity", "off"], 0).stderr)
     kinds = {}
-    for words in (["--image", "surface"], ["--image", "count"], ["--warp", "predicted"], ["--baseline-ms", "20:40"], ["--rotation", "window"]):
+    for words in (["--image", "surface"], ["--image", "count"], ["--warp", "predicted"], ["--warp", "global"], ["--warp", "tiled"], ["--baseline-ms", "20:40"], ["--rotation", "window"]):
         key = " ".join(words)
         expect(key, ["replay", "flight", "-o", "out/k", "-q", "--no-report", *words], 0)
         option = words[0][2:]
@@ -319,7 +319,7 @@ def test_velocity():
     check("but not how often the poses that do not turn are asked", kinds["--rotation window"] == base)
     expect("paper", ["replay", "flight", "-o", "out/paper", "-q", "--no-report", "--paper"], 0)
     p = summary("out/paper")["settings"]
-    check("paper", (p["image"], p["window_min_us"], p["window_max_us"]) == ("iwe", 0, None), p)
+    check("paper", (p["warp"], p["image"], p["window_min_us"], p["window_max_us"]) == ("tiled", "iwe", 0, None), p)
     expect("paper, but", ["replay", "flight", "-o", "out/paper", "-q", "--no-report", "--paper", "--warp", "none", "--image", "surface"], 0)
     p = summary("out/paper")["settings"]
     check("options count more", (p["warp"], p["image"]) == ("none", "surface"), p)
@@ -329,7 +329,7 @@ def test_velocity():
     check("parameter file, and an option over it", (p["image"], p["velocity"]) == ("surface", "on"), p)
 
     folder = ["replay", "flight", "-o", "out/refused"]
-    expect("a warp of a surface", [*folder, "--image", "surface", "--warp", "predicted"], 2, "--warp is 'predicted'", "--image surface", n_lines=1)
+    expect("a warp of a surface", [*folder, "--image", "surface", "--warp", "tiled"], 2, "--warp is 'tiled'", "--image surface", n_lines=1)
     expect("a warp by no flow", [*folder, "--velocity", "off", "--warp", "predicted", "--image", "iwe"], 2, "--velocity on", n_lines=1)
     bare = ["replay", "flight/events.txt", "-o", "out/refused"]
     expect("no lens, no direction", [*bare, "--velocity", "on", "--attitude", "none"], 1, "--velocity on needs the lens", "--calib", n_lines=1)
