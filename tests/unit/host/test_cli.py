@@ -279,7 +279,7 @@ def test_velocity():
     valid = [row.split(",")[0] for row in pairs[1:] if row.split(",")[2] == "valid"]
     check("at the same times", valid == [row.split(",")[0] for row in rows[1:]])
     check("images and pairs add up", s["images"]["made"] == v["pairs"] + v["images_without_an_older_one"] > 5, s)
-    check("intervals within the limits", all(0.015 <= float(row.split(",")[1]) <= 0.5 for row in pairs[1:]), pairs)
+    check("intervals within the limits", all(0.005 <= float(row.split(",")[1]) <= 0.4 for row in pairs[1:]), pairs)
     check("memory is told", 200_000 < s["library_memory_bytes"] < 4_000_000, s["library_memory_bytes"])
 
     again = run("replay", "flight", "-o", "out/v2", "-q", "--no-report")
@@ -314,9 +314,10 @@ def test_velocity():
         kinds[key] = (ROOT / "out/k/velocity.csv").read_bytes()
         check(f"{key}: gives directions", k["velocity"]["valid"] > 0, k["velocity"])
     base = (ROOT / "out/v/velocity.csv").read_bytes()
-    check("each makes a difference", base not in [kinds[k] for k in kinds if k != "--rotation window"] and
-          len(set(kinds.values())) == len(kinds), [k for k in kinds if kinds[k] == base])
-    check("but not how often the poses that do not turn are asked", kinds["--rotation window"] == base)
+    same = ["--rotation window", "--warp global"]  # Nothing turns, and the flow of a wall that comes nearer has no mean.
+    check("each makes a difference", base not in [kinds[k] for k in kinds if k not in same] and
+          len({kinds[k] for k in kinds if k not in same}) == len(kinds) - len(same), [k for k in kinds if kinds[k] == base])
+    check("but for those that cannot", all(kinds[k] == base for k in same), same)
     expect("paper", ["replay", "flight", "-o", "out/paper", "-q", "--no-report", "--paper"], 0)
     p = summary("out/paper")["settings"]
     check("paper", (p["warp"], p["image"], p["window_min_us"], p["window_max_us"]) == ("tiled", "iwe", 0, None), p)
