@@ -89,6 +89,35 @@ static view_t view_of(const evs_image_t *image)
     return view;
 }
 
+/* memset() and memcpy() for a few bytes: those of a microcontroller's C library go one by one. */
+static void fill_bytes(uint8_t *out, uint8_t grey, int32_t n_bytes)
+{
+    const uint32_t word = grey * 0x01010101u;
+    for (; n_bytes >= 4; n_bytes -= 4) {
+        memcpy(out, &word, 4u);
+        out += 4;
+    }
+    if ((n_bytes & 2) != 0) {
+        memcpy(out, &word, 2u);
+        out += 2;
+    }
+    if ((n_bytes & 1) != 0) { *out = grey; }
+}
+static void copy_bytes(uint8_t *out, const uint8_t *in, int32_t n_bytes)
+{
+    for (; n_bytes >= 4; n_bytes -= 4) {
+        memcpy(out, in, 4u);
+        out += 4;
+        in += 4;
+    }
+    if ((n_bytes & 2) != 0) {
+        memcpy(out, in, 2u);
+        out += 2;
+        in += 2;
+    }
+    if ((n_bytes & 1) != 0) { *out = *in; }
+}
+
 /* Copy a part of the image that reaches over its border, which goes on outside. */
 static void fill_patch(const evs_flow_t *flow, view_t *view, int32_t x, int32_t y)
 {
@@ -102,9 +131,9 @@ static void fill_patch(const evs_flow_t *flow, view_t *view, int32_t x, int32_t 
     uint8_t *out = flow->patch;
     for (int32_t row = 0; row < flow->patch_rows; row++) {
         const uint8_t *const in = view->image->px + (size_t)(evs_clamp(y + row, 0, h - 1) * w);
-        memset(out, in[0], (size_t)n_left);
-        memcpy(out + n_left, in + x + n_left, (size_t)n_inside);
-        memset(out + n_left + n_inside, in[w - 1], (size_t)n_right);
+        fill_bytes(out, in[0], n_left);
+        if (n_inside > 0) { copy_bytes(out + n_left, in + (x + n_left), n_inside); }
+        fill_bytes(out + n_left + n_inside, in[w - 1], n_right);
         out += columns;
     }
     view->patch_x = x;

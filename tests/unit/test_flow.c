@@ -586,6 +586,56 @@ static void test_images_smaller_than_a_window_are_tracked_or_lost(void)
     }
 }
 
+/* An image alone gives the bits of the same image in the middle of a larger one that goes on as its border does. */
+static void test_the_border_goes_on(void)
+{
+    enum { MARGIN = 20 }; /* A window of 15 px may lie 7 px outside, and sees 7 more and 2 for gradients. */
+    static const uint16_t SIZES[][2] = {{1, 9}, {2, 9}, {3, 2}, {5, 30}, {6, 3}, {30, 5}, {40, 30}};
+    static uint8_t small_px[2][40 * 30];
+    size_t n_compared = 0u;
+    for (size_t s = 0u; s < 7u; s++) {
+        const uint16_t w = SIZES[s][0], h = SIZES[s][1];
+        evs_pyramid_t small[2], large[2];
+        for (size_t k = 0u; k < 2u; k++) {
+            uint8_t *const px = (k == 0u) ? first_px : second_px;
+            for (size_t i = 0u; i < (size_t)w * h; i++) { small_px[k][i] = (uint8_t)next_random(256u); }
+            for (int y = 0; y < H; y++) {
+                for (int x = 0; x < W; x++) {
+                    px[y * W + x] = small_px[k][evs_clamp(y - MARGIN, 0, h - 1) * w + evs_clamp(x - MARGIN, 0, w - 1)];
+                }
+            }
+            const evs_image_t image = {small_px[k], w, h};
+            TEST_ASSERT_EQUAL_INT(EVS_OK, evs_pyramid_build(&small[k], &image, 1u, NULL, 0u));
+        }
+        build(1u);
+        large[0] = first;
+        large[1] = second;
+        for (uint16_t stride = 1u; stride <= 2u; stride++) {
+            const evs_flow_config_t cfg = config(15u, stride, 5u);
+            init(&cfg);
+            for (size_t i = 0u; i < 20u; i++) {
+                evs_flow_track_t here = {.status = 99u}, there;
+                here.from.x_q8 = (int32_t)next_random((uint32_t)(w - 1) * 256u + 1u);
+                here.from.y_q8 = (int32_t)next_random((uint32_t)(h - 1) * 256u + 1u);
+                here.to = here.from;
+                there = here;
+                there.from.x_q8 = there.to.x_q8 = here.from.x_q8 + MARGIN * 256;
+                there.from.y_q8 = there.to.y_q8 = here.from.y_q8 + MARGIN * 256;
+                evs_flow_track(&flow, &small[0], &small[1], &here, 1u);
+                evs_flow_track(&flow, &large[0], &large[1], &there, 1u);
+                if (here.status == EVS_FLOW_LOST_BORDER) { continue; } /* It has left the one, but not the other. */
+                TEST_ASSERT_EQUAL_UINT8(there.status, here.status);
+                if (here.status != EVS_FLOW_OK) { continue; }
+                TEST_ASSERT_EQUAL_INT32(there.to.x_q8 - MARGIN * 256, here.to.x_q8);
+                TEST_ASSERT_EQUAL_INT32(there.to.y_q8 - MARGIN * 256, here.to.y_q8);
+                TEST_ASSERT_EQUAL_UINT16(there.residual_q8, here.residual_q8);
+                n_compared++;
+            }
+        }
+    }
+    TEST_ASSERT_TRUE(n_compared > 100u);
+}
+
 /* The same bits on every target and with every kernel, however the tracks are split. */
 static void test_bits_are_those_of_every_other_target(void)
 {
@@ -645,6 +695,7 @@ int main(void)
     RUN_TEST(test_a_point_that_leaves_the_image_is_lost_at_the_border);
     RUN_TEST(test_the_hardest_contrast_overflows_nothing);
     RUN_TEST(test_images_smaller_than_a_window_are_tracked_or_lost);
+    RUN_TEST(test_the_border_goes_on);
     RUN_TEST(test_bits_are_those_of_every_other_target);
     return UNITY_END();
 }
