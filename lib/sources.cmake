@@ -17,8 +17,8 @@ set(EVS_SOURCES
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_egomotion_search.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_fixed.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow.c
-    ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow_dsp.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow_grid.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow_pairs.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow_plain.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow_sse2.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_gauss_table.c

@@ -55,9 +55,9 @@ void evs_flow_template_sse2(evs_flow_t *flow, evs_flow_place_t at, evs_flow_text
 void evs_flow_pull_sse2(const evs_flow_t *flow, evs_flow_place_t at, evs_flow_pull_t *pull);
 uint32_t evs_flow_difference_sse2(const evs_flow_t *flow, evs_flow_place_t at);
 
-/* Two samples at a time, for stride 2: Arm's DSP extension. */
-void evs_flow_template_dsp(evs_flow_t *flow, evs_flow_place_t at, evs_flow_texture_t *texture);
-void evs_flow_pull_dsp(const evs_flow_t *flow, evs_flow_place_t at, evs_flow_pull_t *pull);
+/* Two samples at a time, for stride 2: in halves of registers, with or without Arm's DSP extension. */
+void evs_flow_template_pairs(evs_flow_t *flow, evs_flow_place_t at, evs_flow_texture_t *texture);
+void evs_flow_pull_pairs(const evs_flow_t *flow, evs_flow_place_t at, evs_flow_pull_t *pull);
 
 /* The one of this build. */
 static inline void evs_flow_template(evs_flow_t *flow, evs_flow_place_t at, evs_flow_texture_t *texture)
@@ -65,12 +65,10 @@ static inline void evs_flow_template(evs_flow_t *flow, evs_flow_place_t at, evs_
 #if EVS_SIMD_X86
     evs_flow_template_sse2(flow, at, texture);
 #else
-#if EVS_SIMD_DSP && !EVS_SIMD_MVE
     if (flow->cfg.stride_px == 2u) {
-        evs_flow_template_dsp(flow, at, texture);
+        evs_flow_template_pairs(flow, at, texture);
         return;
     }
-#endif
     evs_flow_template_plain(flow, at, texture);
 #endif
 }
@@ -79,12 +77,10 @@ static inline void evs_flow_pull(const evs_flow_t *flow, evs_flow_place_t at, ev
 #if EVS_SIMD_X86
     evs_flow_pull_sse2(flow, at, pull);
 #else
-#if EVS_SIMD_DSP && !EVS_SIMD_MVE
     if (flow->cfg.stride_px == 2u) {
-        evs_flow_pull_dsp(flow, at, pull);
+        evs_flow_pull_pairs(flow, at, pull);
         return;
     }
-#endif
     evs_flow_pull_plain(flow, at, pull);
 #endif
 }

@@ -598,7 +598,11 @@ static void test_the_border_goes_on(void)
         evs_pyramid_t small[2], large[2];
         for (size_t k = 0u; k < 2u; k++) {
             uint8_t *const px = (k == 0u) ? first_px : second_px;
-            for (size_t i = 0u; i < (size_t)w * h; i++) { small_px[k][i] = (uint8_t)next_random(256u); }
+            for (size_t i = 0u; i < (size_t)w * h; i++) {
+                const int32_t grey =
+                    (k == 0u) ? (int32_t)next_random(256u) : small_px[0][i] + (int32_t)next_random(60u);
+                small_px[k][i] = (uint8_t)evs_clamp(grey, 0, 255);
+            }
             for (int y = 0; y < H; y++) {
                 for (int x = 0; x < W; x++) {
                     px[y * W + x] = small_px[k][evs_clamp(y - MARGIN, 0, h - 1) * w + evs_clamp(x - MARGIN, 0, w - 1)];
