@@ -58,6 +58,7 @@ uint32_t evs_flow_difference_sse2(const evs_flow_t *flow, evs_flow_place_t at);
 /* Two samples at a time, for stride 2: in halves of registers, with or without Arm's DSP extension. */
 void evs_flow_template_pairs(evs_flow_t *flow, evs_flow_place_t at, evs_flow_texture_t *texture);
 void evs_flow_pull_pairs(const evs_flow_t *flow, evs_flow_place_t at, evs_flow_pull_t *pull);
+uint32_t evs_flow_difference_pairs(const evs_flow_t *flow, evs_flow_place_t at);
 
 /* The one of this build. */
 static inline void evs_flow_template(evs_flow_t *flow, evs_flow_place_t at, evs_flow_texture_t *texture)
@@ -89,7 +90,7 @@ static inline uint32_t evs_flow_difference(const evs_flow_t *flow, evs_flow_plac
 #if EVS_SIMD_X86
     return evs_flow_difference_sse2(flow, at);
 #else
-    return evs_flow_difference_plain(flow, at);
+    return (flow->cfg.stride_px == 2u) ? evs_flow_difference_pairs(flow, at) : evs_flow_difference_plain(flow, at);
 #endif
 }
 

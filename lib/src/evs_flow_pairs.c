@@ -64,11 +64,12 @@ static inline int32_t add_products(int32_t acc, pair_t a, pair_t b)
 }
 static inline pair_t gradient(pair_t before, pair_t after)
 {
-    pair_t twice = subtract(after, before);
-    __asm__("sadd16 %0, %1, %2" : "=r"(twice) : "r"(twice), "r"(0x00400040u));
+    const pair_t twice = subtract(after + 0x00400040u, before); /* Greys are far enough from 2^16. */
     const int32_t first = (int32_t)(twice << 16) >> 23;
     const int32_t second = (int32_t)twice >> 23;
-    return ((uint32_t)first & 0xFFFFu) | ((uint32_t)second << 16);
+    pair_t out;
+    __asm__("pkhbt %0, %1, %2, lsl #16" : "=r"(out) : "r"(first), "r"(second));
+    return out;
 }
 
 #else
@@ -90,15 +91,10 @@ static inline pair_t make_pair(int32_t first, int32_t second)
 {
     return ((uint32_t)first & 0xFFFFu) | ((uint32_t)second << 16);
 }
-static inline pair_t read_pair(const int16_t *p) { return make_pair(p[0], p[1]); }
 static inline void write_pair(int16_t *p, pair_t v)
 {
     p[0] = (int16_t)first_of(v);
     p[1] = (int16_t)second_of(v);
-}
-static inline pair_t subtract(pair_t a, pair_t b)
-{
-    return make_pair(first_of(a) - first_of(b), second_of(a) - second_of(b));
 }
 static inline int32_t add_products(int32_t acc, pair_t a, pair_t b)
 {
@@ -187,33 +183,138 @@ void evs_flow_template_pairs(evs_flow_t *flow, evs_flow_place_t at, evs_flow_tex
 
 /* --- pull and difference ----------------------------------------------------------------------------------------- */
 
-/* Greys Q7 of two samples. */
-static inline pair_t blend(const evs_flow_place_t *at, const uint8_t *px)
+#if EVS_SIMD_DSP
+
+/* What the loop loads, and its own stack frame, here so that -fstack-usage sees it. */
+typedef struct {
+    const uint8_t *px;
+    size_t pitch;
+    uint32_t w00, w01, w10, w11;
+    const int16_t *group;
+    size_t n_rows;
+    uint32_t saved[9];
+} block_t;
+
+EVS_STATIC_ASSERT(offsetof(block_t, saved) == 32u, "an offset in pull_rows()");
+
+/*
+ * One or two groups of eight samples in each row, 16 instructions a pair: the sums go to the first two words of the block.
+ * Naked functions, because all registers are in use.
+ *   r0 block, r1 px, r2 pitch, r3-r6 weights, r7 group, r8 and r9 the sums; r10-r12 and lr are free.
+ */
+#define PULL_PAIR(offset, offset_dx, offset_dy)                                                                        \
+    "ldr    r10, [r1, r2]              \n"                                                                             \
+    "ldr    r11, [r1], #4              \n"                                                                             \
+    "uxtb16 r12, r11                   \n"                                                                             \
+    "mul    lr, r12, r3                \n"                                                                             \
+    "uxtb16 r11, r11, ror #8           \n"                                                                             \
+    "mla    lr, r11, r4, lr            \n"                                                                             \
+    "uxtb16 r12, r10                   \n"                                                                             \
+    "mla    lr, r12, r5, lr            \n"                                                                             \
+    "uxtb16 r10, r10, ror #8           \n"                                                                             \
+    "mla    lr, r10, r6, lr            \n"                                                                             \
+    "ldr    r12, [r7, #" offset "]     \n"                                                                             \
+    "ssub16 lr, lr, r12                \n"                                                                             \
+    "ldr    r10, [r7, #" offset_dx "]  \n"                                                                             \
+    "ldr    r11, [r7, #" offset_dy "]  \n"                                                                             \
+    "smlad  r8, r10, lr, r8            \n"                                                                             \
+    "smlad  r9, r11, lr, r9            \n"
+#define PULL_GROUP                                                                                                     \
+    PULL_PAIR("0", "16", "32")                                                                                         \
+    PULL_PAIR("4", "20", "36") PULL_PAIR("8", "24", "40") PULL_PAIR("12", "28", "44") "adds r7, r7, #48 \n"
+#define PULL_ROWS(GROUPS, BYTES)                                                                                       \
+    __asm__ volatile("add    r12, r0, #32               \n"                                                            \
+                     "stmia  r12, {r4-r11, lr}          \n"                                                            \
+                     "ldmia  r0, {r1-r7}                \n"                                                            \
+                     "mov    r8, #0                     \n"                                                            \
+                     "mov    r9, #0                     \n"                                                            \
+                     "1:                                \n" GROUPS "add    r1, r1, r2, lsl #1         \n"              \
+                     "sub    r1, r1, #" BYTES "         \n"                                                            \
+                     "ldr    r10, [r0, #28]             \n"                                                            \
+                     "subs   r10, r10, #1               \n"                                                            \
+                     "str    r10, [r0, #28]             \n"                                                            \
+                     "bne    1b                         \n"                                                            \
+                     "stmia  r0, {r8, r9}               \n"                                                            \
+                     "add    r12, r0, #32               \n"                                                            \
+                     "ldmia  r12, {r4-r11, pc}          \n" ::                                                         \
+                         : "memory")
+
+static __attribute__((naked, noinline)) void pull_rows_of_one(__attribute__((unused)) block_t *block)
 {
-    pair_t upper[2], lower[2];
-    read_pixels(px, upper);
-    read_pixels(px + at->pitch, lower);
-    return upper[0] * at->w00 + upper[1] * at->w01 + lower[0] * at->w10 + lower[1] * at->w11;
+    PULL_ROWS(PULL_GROUP, "16");
+}
+static __attribute__((naked, noinline)) void pull_rows_of_two(__attribute__((unused)) block_t *block)
+{
+    PULL_ROWS(PULL_GROUP PULL_GROUP, "32");
 }
 
 void evs_flow_pull_pairs(const evs_flow_t *flow, evs_flow_place_t at, evs_flow_pull_t *pull)
 {
-    const int16_t *group = flow->samples;
-    const size_t n_groups = flow->n_pitch / 8u;
-    const size_t to_next_row = 2u * at.pitch - 16u * n_groups;
-    const uint8_t *px = at.px;
-    int32_t x = 0, y = 0;
-    for (size_t i = flow->n_side; i > 0u; i--) {
-        for (size_t g = n_groups; g > 0u; g--) {
-            for (size_t k = 0u; k < 8u; k += 2u) {
-                const pair_t difference = subtract(blend(&at, px + 2u * k), read_pair(group + k));
-                x = add_products(x, read_pair(group + EVS_FLOW_DX + k), difference);
-                y = add_products(y, read_pair(group + EVS_FLOW_DY + k), difference);
-            }
-            px += 16;
-            group += EVS_FLOW_GROUP;
-        }
-        px += to_next_row;
+    union {
+        block_t block;
+        int32_t sums[2];
+    } u;
+    u.block = (block_t){.px = at.px,
+                        .pitch = at.pitch,
+                        .w00 = at.w00,
+                        .w01 = at.w01,
+                        .w10 = at.w10,
+                        .w11 = at.w11,
+                        .group = flow->samples,
+                        .n_rows = flow->n_side};
+    if (flow->n_pitch == 8u) {
+        pull_rows_of_one(&u.block);
+    } else {
+        pull_rows_of_two(&u.block);
     }
-    *pull = (evs_flow_pull_t){x, y};
+    *pull = (evs_flow_pull_t){u.sums[0], u.sums[1]};
 }
+
+/* Sum of the absolute values of two differences, added. */
+static inline uint32_t add_sizes(uint32_t acc, pair_t a, pair_t b)
+{
+    pair_t size;
+    __asm__("ssub16 %0, %1, %2 \n"
+            "ssub16 %1, %2, %1 \n"
+            "sel    %0, %1, %0 \n"
+            : "=&r"(size), "+r"(a)
+            : "r"(b)
+            : "cc");
+    return (uint32_t)add_products((int32_t)acc, size, 0x00010001u);
+}
+
+uint32_t evs_flow_difference_pairs(const evs_flow_t *flow, evs_flow_place_t at)
+{
+    uint32_t sum = 0u;
+    for (size_t i = 0u; i < flow->n_side; i++) {
+        const int16_t *sample = evs_flow_sample(flow, i, 0u);
+        const uint8_t *px = at.px;
+        size_t c = 0u;
+        for (; c + 2u <= flow->n_side; c += 2u) {
+            pair_t upper[2], lower[2];
+            read_pixels(px, upper);
+            read_pixels(px + at.pitch, lower);
+            const pair_t grey = upper[0] * at.w00 + upper[1] * at.w01 + lower[0] * at.w10 + lower[1] * at.w11;
+            sum = add_sizes(sum, grey, read_pair(sample));
+            px += 4;
+            sample += (c % 8u == 6u) ? EVS_FLOW_GROUP - 6 : 2;
+        }
+        if (c < flow->n_side) { sum += evs_abs_u32(evs_flow_blend(px, &at) - *sample); }
+        at.px += 2u * at.pitch;
+    }
+    return sum;
+}
+
+#else
+
+/* Without these instructions pairs are no faster. */
+void evs_flow_pull_pairs(const evs_flow_t *flow, evs_flow_place_t at, evs_flow_pull_t *pull)
+{
+    evs_flow_pull_plain(flow, at, pull);
+}
+uint32_t evs_flow_difference_pairs(const evs_flow_t *flow, evs_flow_place_t at)
+{
+    return evs_flow_difference_plain(flow, at);
+}
+
+#endif
