@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * SPDX-FileCopyrightText: 2026 the evstab authors */
-/* The kernels of optical flow, those that this build uses and others that it has, give the bits of the plain ones, for any content, window and fraction, and
- * read no pixel beyond those that the header of the kernels allows. */
+/* The kernels of optical flow, those that this build uses and others that it has, give the bits of the plain ones for any
+ * content, window and fraction, and read no pixel beyond those that the header of the kernels allows. */
 #include "../../lib/src/evs_flow_kernel.h"
 #include "unity.h"
 
