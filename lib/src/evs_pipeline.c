@@ -232,7 +232,7 @@ static void follow_attitude(evs_pipeline_t *p, uint32_t t_us, evs_quat_t attitud
 static evs_status_t push_orientation(evs_pipeline_t *p, const evs_orientation_t *sample)
 {
     const evs_status_t status = evs_orientation_track_push(&p->track, sample);
-    if ((status == EVS_OK) && p->cfg.velocity_on) { evs_velocity_push_orientation(&p->imaging->velocity, sample); }
+    if ((status == EVS_OK) && (p->imaging != NULL)) { evs_pipeline_imaging_push_orientation(p, sample); }
     return status;
 }
 

@@ -4,6 +4,65 @@
 
 #include <string.h>
 
+#if EVS_NO_IMAGES
+
+size_t evs_pipeline_imaging_bytes(const evs_pipeline_config_t *cfg)
+{
+    (void)cfg;
+    return 0u; /* such settings are out of range */
+}
+
+evs_status_t evs_pipeline_imaging_init(evs_pipeline_imaging_t *imaging, const evs_pipeline_config_t *cfg,
+                                       unsigned char **cursor)
+{
+    (void)imaging;
+    (void)cfg;
+    (void)cursor;
+    return EVS_ERR_ARG;
+}
+
+void evs_pipeline_imaging_push_orientation(evs_pipeline_t *p, const evs_orientation_t *sample)
+{
+    (void)p;
+    (void)sample;
+}
+
+void evs_pipeline_imaging_add(evs_pipeline_t *p, const evs_event_t *ev, const evs_point_t *points, size_t n)
+{
+    (void)p;
+    (void)ev;
+    (void)points;
+    (void)n;
+}
+
+void evs_pipeline_imaging_finish(evs_pipeline_t *p, evs_pipeline_chunk_t *chunk)
+{
+    (void)p;
+    (void)chunk;
+}
+
+bool evs_pipeline_velocity(evs_pipeline_t *p, size_t max_tracks, evs_velocity_result_t *result)
+{
+    (void)p;
+    (void)max_tracks;
+    (void)result;
+    return false;
+}
+
+bool evs_pipeline_velocity_busy(const evs_pipeline_t *p)
+{
+    (void)p;
+    return false;
+}
+
+const evs_velocity_t *evs_pipeline_velocity_part(const evs_pipeline_t *p)
+{
+    (void)p;
+    return NULL;
+}
+
+#else
+
 /* --- settings and memory ------------------------------------------------------------------------------------------ */
 
 /* The settings of the modules, as far as the pipeline decides them. */
@@ -132,6 +191,11 @@ static bool same_rotation(evs_quat_t a, evs_quat_t b)
 static evs_quat_t reference_of(const evs_pipeline_t *p)
 {
     return (p->cfg.source == EVS_PIPELINE_NONE) ? evs_quat_identity() : evs_stabilize_reference(&p->stabilize);
+}
+
+void evs_pipeline_imaging_push_orientation(evs_pipeline_t *p, const evs_orientation_t *sample)
+{
+    if (p->cfg.velocity_on) { evs_velocity_push_orientation(&p->imaging->velocity, sample); }
 }
 
 /* The first event of a window: an old surface is of no use after a saccade, nor is a flow seen from elsewhere. */
@@ -278,3 +342,5 @@ const evs_velocity_t *evs_pipeline_velocity_part(const evs_pipeline_t *p)
     EVS_ASSERT(p != NULL);
     return p->cfg.velocity_on ? &p->imaging->velocity : NULL;
 }
+
+#endif

@@ -33,6 +33,9 @@ size_t evs_pipeline_imaging_bytes(const evs_pipeline_config_t *cfg);
 evs_status_t evs_pipeline_imaging_init(evs_pipeline_imaging_t *imaging, const evs_pipeline_config_t *cfg,
                                        unsigned char **cursor);
 
+/* A sample that the orientation track has taken. */
+void evs_pipeline_imaging_push_orientation(evs_pipeline_t *p, const evs_orientation_t *sample);
+
 /* n events of the open window, stabilized. */
 void evs_pipeline_imaging_add(evs_pipeline_t *p, const evs_event_t *ev, const evs_point_t *points, size_t n);
 

@@ -94,6 +94,32 @@ def sizes_of(tree, types):
     return {name: int(size, 16) for size, name in re.findall(r"^\w+ (\w+) \w sizeof_(\w+)$", out, re.M)}
 
 
+# Whole pipelines: context and memory block together, as a user of the default settings places them.
+PIPELINE = "sizeof(evs_pipeline_t) + EVS_PIPELINE_BYTES({w}, {h}, 8u, false, 34u * 26u, 2048u, 32u, 128u)"
+PIPELINES = {
+    "stabilized events, 240 × 180": PIPELINE.format(w=240, h=180),
+    "… and the direction of flight, 240 × 180":
+        PIPELINE.format(w=240, h=180) + " + EVS_PIPELINE_VELOCITY_BYTES(240, 180)",
+    "stabilized events, 346 × 260": PIPELINE.format(w=346, h=260),
+    "… and the direction of flight, 346 × 260":
+        PIPELINE.format(w=346, h=260) + " + EVS_PIPELINE_VELOCITY_BYTES(346, 260)",
+}
+
+
+def sizes_of_pipelines(tree):
+    """What each whole pipeline occupies on the target: the macros of its header are constant expressions."""
+    with tempfile.TemporaryDirectory() as work:
+        source, obj = os.path.join(work, "pipelines.c"), os.path.join(work, "pipelines.o")
+        with open(source, "w", encoding="utf-8") as f:
+            f.write('#include "evs/pipeline.h"\n')
+            for i, size in enumerate(PIPELINES.values()):
+                f.write(f"extern char pipeline_{i}[]; char pipeline_{i}[{size}];\n")
+        tree.compile(source, obj)
+        out = subprocess.run([tree.tool("nm"), "-S", obj], check=True, capture_output=True, text=True).stdout
+    sizes = {int(i): int(size, 16) for size, i in re.findall(r"^\w+ (\w+) \w pipeline_(\d+)$", out, re.M)}
+    return {name: sizes[i] for i, name in enumerate(PIPELINES)}
+
+
 def table(head, rows):
     lines = ["| " + " | ".join(head) + " |", "|---" + "|--:" * (len(head) - 1) + "|"]
     lines += ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows]
@@ -130,6 +156,10 @@ def generate(trees):
         sizes = {tree.name: sizes_of(tree, types) for tree in trees}
         out += "\nContexts that the caller places (`sizeof`), bytes; buffers come on top, by the macros of each header:\n\n"
         out += table(["type"] + names, [[f"`{t}`"] + [sizes[tree.name][t] for tree in trees] for t in types])
+    whole = {tree.name: sizes_of_pipelines(tree) for tree in trees}
+    out += ("\nWhole pipelines, context and buffers, with a table of step 8, 34 x 26 tiles, 2048 events, 32 orientations, "
+            "batches of 128, bytes:\n\n")
+    out += table(["pipeline"] + names, [[name] + [whole[tree.name][name] for tree in trees] for name in PIPELINES])
     return out
 
 

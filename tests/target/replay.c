@@ -8,10 +8,24 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { WIDTH_MAX = 240, HEIGHT_MAX = 180, TILES_MAX = 34 * 26, FIFO = 2048, RING = 32, BATCH = 128 };
+enum {
+    WIDTH_MAX = 240,
+    HEIGHT_MAX = 180,
+    TILES_MAX = 34 * 26,
+    FIFO = 2048,
+    RING = 32,
+    BATCH = 128,
+    TRACKS_PER_STEP = 16
+};
 
-/* Enough for the largest setting, "full". */
-static uint64_t memory[EVS_PIPELINE_BYTES(WIDTH_MAX, HEIGHT_MAX, 1u, true, TILES_MAX, FIFO, RING, BATCH) / 8u];
+/* Enough for the largest settings, "full" and "velocity". */
+#define BYTES_FULL EVS_PIPELINE_BYTES(WIDTH_MAX, HEIGHT_MAX, 1u, true, TILES_MAX, FIFO, RING, BATCH)
+#define BYTES_VELOCITY                                                                                                 \
+    (EVS_PIPELINE_BYTES(WIDTH_MAX, HEIGHT_MAX, 8u, false, TILES_MAX, FIFO, RING, BATCH) +                              \
+     EVS_PIPELINE_IMAGE_BYTES(WIDTH_MAX, HEIGHT_MAX, EVS_PIPELINE_IMAGE_IWE, EVS_IWE_NEAREST,                          \
+                              EVS_PIPELINE_WARP_PREDICTED, true, BATCH) +                                              \
+     EVS_VELOCITY_DEFAULT_BYTES(WIDTH_MAX, HEIGHT_MAX))
+static uint64_t memory[((BYTES_FULL > BYTES_VELOCITY) ? BYTES_FULL : BYTES_VELOCITY) / 8u];
 static evs_pipeline_t pipeline;
 static recording_t recording;
 
@@ -33,6 +47,33 @@ static uint32_t crc_window(uint32_t crc, const evs_window_end_t *end)
     return crc32_u32(crc, (uint32_t)end->reason);
 }
 
+static uint32_t crc_vec3(uint32_t crc, evs_vec3_t v)
+{
+    return crc32_u32(crc32_u32(crc32_u32(crc, (uint32_t)v.x), (uint32_t)v.y), (uint32_t)v.z);
+}
+
+static uint32_t crc_direction(uint32_t crc, const evs_velocity_result_t *v)
+{
+    crc = crc32_u32(crc32_u32(crc, v->t_us), v->interval_us);
+    crc = crc32_u32(crc32_u32(crc, v->baseline_us), v->flags);
+    crc = crc_quat(crc_vec3(crc_vec3(crc, v->v_r_q30), v->v_c_q30), v->q_wr);
+    crc = crc32_u16(crc32_u16(crc, v->n_corners), v->n_flow);
+    crc = crc32_u16(crc32_u32(crc, v->flow_px_q8), v->mismatch_q8);
+    crc = crc32_u32(crc32_u32(crc, v->solution.flags), v->solution.n_inliers);
+    return crc32_u32(crc, (uint32_t)v->solution.sigma_rad_q28);
+}
+
+/* All the work on an image at once, in steps. */
+static void work(replay_result_t *r)
+{
+    evs_velocity_result_t velocity;
+    while (evs_pipeline_velocity_busy(&pipeline)) {
+        if (!evs_pipeline_velocity(&pipeline, TRACKS_PER_STEP, &velocity)) { continue; }
+        r->velocity = crc_direction(r->velocity, &velocity);
+        if ((velocity.flags & EVS_VELOCITY_VALID) != 0u) { r->n_directions++; }
+    }
+}
+
 static void pull_all(replay_result_t *r)
 {
     evs_pipeline_chunk_t chunk;
@@ -49,6 +90,7 @@ static void pull_all(replay_result_t *r)
             r->n_windows++;
             if (chunk.saccade) { r->n_saccades++; }
         }
+        work(r);
     }
 }
 
@@ -76,8 +118,10 @@ static void push_imu(replay_result_t *r)
     pull_all(r);
 }
 
-static bool choose(const char *setting, evs_pipeline_config_t *cfg)
+static bool choose(const char *setting, const evs_camera_config_t *camera, evs_pipeline_config_t *cfg)
 {
+    const bool velocity = strcmp(setting, "velocity") == 0;
+    *cfg = velocity ? evs_pipeline_config_velocity(camera) : evs_pipeline_config_default(camera);
     cfg->n_fifo = FIFO;
     cfg->n_ring = RING;
     cfg->n_batch = BATCH;
@@ -93,6 +137,9 @@ static bool choose(const char *setting, evs_pipeline_config_t *cfg)
         cfg->window.kind = EVS_WINDOW_DURATION;
         cfg->window.duration_us = 5000u;
         cfg->stabilize.saccade_px_q4 = EVS_STABILIZE_SACCADE_OFF;
+    } else if (velocity) {
+        cfg->table_step_px = 8u;
+        cfg->warp = EVS_PIPELINE_WARP_PREDICTED;
     } else {
         return false;
     }
@@ -106,8 +153,8 @@ const char *replay_run(recording_read_fn read, void *source, const char *setting
 
     memset(result, 0, sizeof *result);
     if (!recording_open(&recording, read, source, &camera)) { return "not a recording"; }
-    evs_pipeline_config_t cfg = evs_pipeline_config_default(&camera);
-    if (!choose(setting, &cfg)) { return "unknown setting"; }
+    evs_pipeline_config_t cfg;
+    if (!choose(setting, &camera, &cfg)) { return "unknown setting"; }
     const evs_status_t status = evs_pipeline_init(&pipeline, &cfg, memory, sizeof memory);
     if (status != EVS_OK) { return evs_status_name(status); }
     if (!replay_images_start(camera.width_px, camera.height_px)) { return "images refused"; }
@@ -144,5 +191,7 @@ void replay_print(const replay_result_t *r)
     printf("stabilized  %08lx\n", (unsigned long)r->stabilized);
     printf("iwe         %08lx\n", (unsigned long)r->images.iwe);
     printf("surface     %08lx\n", (unsigned long)r->images.surface);
+    printf("directions  %lu\n", (unsigned long)r->n_directions);
+    printf("velocity    %08lx\n", (unsigned long)r->velocity);
     printf("counters    %08lx\n", (unsigned long)r->counts);
 }

@@ -22,13 +22,15 @@ typedef struct {
     uint32_t windows;
     uint32_t stabilized;
     replay_images_t images;
-    uint32_t counts; /**< ... and of the counters of bad input. */
+    uint32_t n_directions; /**< Directions of flight that are valid; ... */
+    uint32_t velocity;     /**< ... a CRC of all, ... */
+    uint32_t counts;       /**< ... and of the counters of bad input. */
 } replay_result_t;
 
 /**
  * @param setting  "full": exact table, tiles from a table, windows by area, rotation per slice. "grid": grid of 8 px,
  *                 windows by count, rotation per window. "duration": grid of 4 px, windows by time, per slice, no
- * saccades.
+ *                 saccades. "velocity": grid of 8 px, images with the predicted warp, direction of flight.
  * @return NULL when all went well, else what did not.
  */
 const char *replay_run(recording_read_fn read, void *source, const char *setting, replay_result_t *result);

@@ -21,6 +21,11 @@ enum { N_KEPT = 12000, N_BUDGET = 2000 };
                               N_BATCH) +                                                                               \
      EVS_PIPELINE_WARP_BYTES(W, H, N_KEPT, N_BUDGET, 16u, 1u) + EVS_VELOCITY_DEFAULT_BYTES(W, H))
 
+EVS_STATIC_ASSERT(EVS_PIPELINE_BYTES(240, 180, 8u, false, 34u * 26u, 2048u, 32u, 128u) +
+                          EVS_PIPELINE_VELOCITY_BYTES(240, 180) + sizeof(evs_pipeline_t) <=
+                      300000u,
+                  "all of it fits into a microcontroller of 320 KB");
+
 static evs_pipeline_t p;
 static uint64_t memory[BYTES / 8u + 1u]; /* the last word is a canary */
 static evs_camera_config_t camera;

@@ -9,6 +9,8 @@
  *
  *   EVS_ASSERT(c)     contract checks on hot paths. Default: assert() of <assert.h>; off with NDEBUG.
  *   EVS_NO_SIMD       1 keeps to the plain C kernels. Default 0. The output bits are the same either way.
+ *   EVS_NO_IMAGES     1 takes images and the direction of flight out of the pipeline, which refuses settings that ask for
+ *                     them. Default 0. It saves the flash of what would be linked without being used.
  */
 #ifndef EVS_CONFIG_H
 #define EVS_CONFIG_H
@@ -24,6 +26,10 @@
 
 #ifndef EVS_NO_SIMD
 #define EVS_NO_SIMD 0
+#endif
+
+#ifndef EVS_NO_IMAGES
+#define EVS_NO_IMAGES 0
 #endif
 
 #if defined(__GNUC__)
