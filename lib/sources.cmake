@@ -13,7 +13,9 @@ set(EVS_SOURCES
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_decay_table.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_egomotion.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_egomotion_pack.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_egomotion_paper.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_egomotion_refine.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_egomotion_rotation.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_egomotion_search.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_fixed.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow.c

@@ -2,8 +2,9 @@
  * SPDX-FileCopyrightText: 2026 the evstab authors */
 #include "evs_egomotion_private.h"
 
-#define PI_Q28        INT32_C(843314857)
-#define SIGMA_MAX_Q28 (INT32_C(1) << 28) /* 1 rad: beyond that a linear model says nothing */
+#define ROTATION_SIGMA_MAX (INT32_C(1) << 28)
+#define PI_Q28             INT32_C(843314857)
+#define SIGMA_MAX_Q28      (INT32_C(1) << 28) /* 1 rad: beyond that a linear model says nothing */
 
 enum {
     WIDE_STEPS = 2,   /* from the hypothesis to where the noise can be judged */
@@ -11,6 +12,7 @@ enum {
     SCALE_MIN = 20,   /* steps: 2 % of the median flow, what 16 bits resolve without loss */
     SCALE_MAX = 1 << EGO_MEDIAN_BITS,
     SCALE_WIDE = SCALE_MAX / 2,
+    NOISE_VECTORS = 256, /* enough to choose a scale by */
     INLIER_LIMIT_MIN = 8 /* steps: the rounding of what is free of noise */
 };
 
@@ -25,17 +27,10 @@ evs_egomotion_config_t evs_egomotion_config_default(void)
 
 static bool config_ok(const evs_egomotion_config_t *cfg)
 {
-    return (cfg->method == EVS_EGOMOTION_ROBUST) && (cfg->flow_kind == EVS_EGOMOTION_FULL_FLOW) &&
-           (cfg->rotation_sigma_rad_q28 == 0) && (cfg->variance_factor_q8 >= 256u);
-}
-
-bool evs_egomotion_is_inlier(const evs_egomotion_result_t *result, const evs_egomotion_flow_t *flow)
-{
-    ego_vector_t p;
-    EVS_ASSERT((result != NULL) && (flow != NULL));
-    if ((result->n_flow == 0u) || !ego_pack_one(result, flow, &p)) { return false; }
-    const ego_set_t set = {.one_bits = 13u - result->position_shift_};
-    return ego_agrees(&p, ego_dir(&set, result->v_q30), result->inlier_limit_);
+    return ((cfg->method == EVS_EGOMOTION_ROBUST) || (cfg->method == EVS_EGOMOTION_PAPER) ||
+            (cfg->method == EVS_EGOMOTION_ERL)) &&
+           (cfg->flow_kind == EVS_EGOMOTION_FULL_FLOW) && (cfg->rotation_sigma_rad_q28 >= 0) &&
+           (cfg->rotation_sigma_rad_q28 <= ROTATION_SIGMA_MAX) && (cfg->variance_factor_q8 >= 256u);
 }
 
 /* --- judging ---------------------------------------------------------------------------------------------------- */
@@ -56,6 +51,20 @@ static bool within(uint64_t n, uint64_t mean_q16, uint32_t k)
     return (n << 16) <= mean_q16 + (uint64_t)k * 256u * evs_sqrt_u64(mean_q16);
 }
 
+/* How many steps a vector is long, to 7 %: good enough to guess at chance. */
+static uint32_t about_length(const ego_vector_t *p)
+{
+    const uint32_t u = evs_abs_u32(p->u);
+    const uint32_t v = evs_abs_u32(p->v);
+    return (u > v) ? u + (v * 3u) / 8u : v + (u * 3u) / 8u;
+}
+
+/* Whether a vector ends within `limit` steps of the line along a, on the side that d tells. */
+static bool is_near_line(const ego_view_t *w, uint32_t limit)
+{
+    return (uint64_t)((int64_t)w->c * w->c) <= (uint64_t)w->a2 * (limit * limit);
+}
+
 /* Count the vectors that agree, and ask whether they are enough, more than chance would give, and of one sign. */
 static void judge_count(const ego_set_t *set, evs_egomotion_result_t *result)
 {
@@ -64,21 +73,50 @@ static void judge_count(const ego_set_t *set, evs_egomotion_result_t *result)
     uint64_t chance_q16 = 0u;
     uint32_t n_against = 0u;
     for (uint32_t i = 0u; i < set->n; i++) {
-        const ego_vector_t *const p = &set->vec[i];
-        const ego_vector_t back = {p->x, p->y, (int16_t)-p->u, (int16_t)-p->v};
-        result->n_inliers += ego_agrees(p, dir, limit) ? 1u : 0u;
-        n_against += ego_agrees(&back, dir, limit) ? 1u : 0u;
-        chance_q16 += by_chance_q16(evs_sqrt_u64((uint64_t)((int32_t)p->u * p->u + (int32_t)p->v * p->v)), limit);
+        const ego_view_t w = ego_view(&set->vec[i], dir);
+        chance_q16 += by_chance_q16(about_length(&set->vec[i]), limit);
+        if (!is_near_line(&w, limit)) { continue; }
+        result->n_inliers += (w.d > 0) ? 1u : 0u;
+        n_against += (w.d < 0) ? 1u : 0u;
     }
     if (result->n_inliers < EVS_EGOMOTION_INLIERS_MIN) { result->flags |= EVS_EGOMOTION_FEW; }
     if (within(result->n_inliers, chance_q16, 4u)) { result->flags |= EVS_EGOMOTION_CHANCE; }
-    const uint64_t half_q16 = (uint64_t)(result->n_inliers + n_against) << 15;
-    if (within(result->n_inliers, half_q16, 3u)) { result->flags |= EVS_EGOMOTION_SIGN_UNSURE; }
+    /* tossed coins differ by more than three times the root of their number once in 400 throws */
+    const int64_t lead = (int64_t)result->n_inliers - n_against;
+    if ((lead <= 0) || (lead * lead <= 9 * ((int64_t)result->n_inliers + n_against))) {
+        result->flags |= EVS_EGOMOTION_SIGN_UNSURE;
+    }
 }
 
-/* Covariance of the tangent plane in rad^2 to the camera's axes, and sigma. */
-static void put_covariance(const ego_frame_t *f, const evs_scaled_t cov[3], evs_egomotion_result_t *result)
+bool evs_egomotion_is_inlier(const evs_egomotion_result_t *result, const evs_egomotion_flow_t *flow)
 {
+    ego_vector_t p;
+    EVS_ASSERT((result != NULL) && (flow != NULL));
+    if ((result->n_flow == 0u) || !ego_pack_one(result, flow, &p)) { return false; }
+    const ego_set_t set = {.one_bits = 13u - result->position_shift_};
+    const ego_view_t w = ego_view(&p, ego_dir(&set, result->v_q30));
+    return (w.d > 0) && is_near_line(&w, result->inlier_limit_);
+}
+
+/* Noise in steps, and the judgement of the vectors under it. */
+static uint32_t judge(const ego_set_t *set, evs_egomotion_result_t *result)
+{
+    const uint32_t noise = ego_noise(set, result->v_q30, NOISE_VECTORS);
+    result->noise_q24 = ego_steps_to_q24(result, noise);
+    result->inlier_limit_ = (uint16_t)evs_clamp((int32_t)(noise * 5u / 2u), INLIER_LIMIT_MIN, 2 * EGO_CLIP);
+    judge_count(set, result);
+    return noise;
+}
+
+/* Covariance of the tangent plane in rad^2, or NULL for none, to the camera's axes, and sigma. */
+static void put_spread(const evs_egomotion_config_t *cfg, evs_scaled_t *cov, evs_egomotion_result_t *result)
+{
+    if (cov == NULL) {
+        result->flags |= EVS_EGOMOTION_DEGENERATE;
+        return;
+    }
+    for (unsigned i = 0u; i < 3u; i++) { cov[i] = evs_scaled_mul(cov[i], evs_scaled(cfg->variance_factor_q8, -8)); }
+    const ego_frame_t f = ego_frame(result->v_q30);
     const evs_scaled_t sigma = evs_scaled_sqrt(evs_scaled_add(cov[0], cov[2]));
     const int32_t sigma_q28 = evs_scaled_to_q(sigma, 28);
     if (sigma_q28 > SIGMA_MAX_Q28) {
@@ -86,8 +124,8 @@ static void put_covariance(const ego_frame_t *f, const evs_scaled_t cov[3], evs_
         return;
     }
     result->sigma_rad_q28 = sigma_q28;
-    const int32_t b0[3] = {f->b0.x, f->b0.y, f->b0.z};
-    const int32_t b1[3] = {f->b1.x, f->b1.y, f->b1.z};
+    const int32_t b0[3] = {f.b0.x, f.b0.y, f.b0.z};
+    const int32_t b1[3] = {f.b1.x, f.b1.y, f.b1.z};
     const int32_t c00 = evs_scaled_to_q(cov[0], 30);
     const int32_t c01 = evs_scaled_to_q(cov[1], 30);
     const int32_t c11 = evs_scaled_to_q(cov[2], 30);
@@ -101,36 +139,78 @@ static void put_covariance(const ego_frame_t *f, const evs_scaled_t cov[3], evs_
     }
 }
 
+/* What one call works on. */
+typedef struct {
+    ego_set_t set;
+    uint32_t *likelihood; /* PAPER, ERL: room for one per vector */
+    const evs_egomotion_flow_t *flow;
+    size_t n;
+} ego_call_t;
+
 /* --- the robust estimate ---------------------------------------------------------------------------------------- */
 
 static uint32_t kernel_scale(uint32_t noise)
 {
-    return (uint32_t)evs_clamp((int32_t)(2u * noise), SCALE_MIN, SCALE_MAX);
+    return (uint32_t)evs_clamp((int32_t)(9u * noise / 4u), SCALE_MIN, SCALE_MAX);
 }
 
-static void solve_robust(const evs_egomotion_config_t *cfg, const ego_set_t *set, evs_egomotion_result_t *result)
+/* The narrow steps with the rotation: it is taken out of the flow anew after each. */
+static uint32_t refine_rotation(const evs_egomotion_config_t *cfg, const ego_call_t *call, evs_vec3_t *v,
+                                ego_rotation_t *rot, evs_egomotion_result_t *result)
 {
-    evs_vec3_t v = ego_search(set);
-    for (int i = 0; i < WIDE_STEPS; i++) { (void)ego_step(set, SCALE_WIDE, 1u, &v); }
     uint32_t s = SCALE_WIDE;
     for (int i = 0; i < NARROW_STEPS; i++) {
-        if ((i & 1) == 0) { s = kernel_scale(ego_noise(set, v)); }
-        (void)ego_step(set, s, 1u, &v);
+        if ((i & 1) == 0) {
+            const uint32_t noise = ego_noise(&call->set, *v, NOISE_VECTORS);
+            s = kernel_scale(noise);
+            rot->prior = ego_rotation_prior(&call->set, result, noise, cfg->rotation_sigma_rad_q28);
+        }
+        if (!ego_step_rotation(&call->set, result, s, v, rot)) { break; }
+        result->rotation_rad_q28 = rot->rad_q28;
+        ego_repack(&call->set, call->flow, call->n, result);
     }
-    const uint32_t noise = ego_noise(set, v);
-    result->v_q30 = v;
-    result->noise_q24 = ego_steps_to_q24(result, noise);
-    result->inlier_limit_ = (uint16_t)evs_clamp((int32_t)(noise * 5u / 2u), INLIER_LIMIT_MIN, 2 * EGO_CLIP);
-    judge_count(set, result);
+    return s;
+}
 
+static void solve_robust(const evs_egomotion_config_t *cfg, const ego_call_t *call, evs_egomotion_result_t *result)
+{
+    const ego_set_t *const set = &call->set;
+    const bool with_rotation = cfg->rotation_sigma_rad_q28 > 0;
+    ego_rotation_t rot = {{0, 0, 0}, {0, 0}};
+    evs_vec3_t v = ego_search(set);
+    uint32_t s = SCALE_WIDE;
+    const uint32_t some = (set->n + EGO_SUBSET - 1u) / EGO_SUBSET;
+    for (int i = 0; i < WIDE_STEPS; i++) { (void)ego_step(set, s, some, &v); }
+    if (with_rotation) {
+        s = refine_rotation(cfg, call, &v, &rot, result);
+    } else {
+        for (int i = 0; i < NARROW_STEPS; i++) {
+            if ((i & 1) == 0) { s = kernel_scale(ego_noise(set, v, NOISE_VECTORS)); }
+            (void)ego_step(set, s, 1u, &v);
+        }
+    }
+    result->v_q30 = v;
+    const uint32_t noise = judge(set, result);
+    if (ego_is_rotation(set, v, s)) { result->flags |= EVS_EGOMOTION_ROTATION; }
     const ego_frame_t f = ego_frame(v);
     evs_scaled_t cov[3];
-    if (ego_covariance(set, &f, s, cov)) {
-        for (int i = 0; i < 3; i++) { cov[i] = evs_scaled_mul(cov[i], evs_scaled(cfg->variance_factor_q8, -8)); }
-        put_covariance(&f, cov, result);
-    } else {
-        result->flags |= EVS_EGOMOTION_DEGENERATE;
-    }
+    const bool definite =
+        with_rotation ? ego_covariance_rotation(set, &f, s, noise, rot.prior, cov) : ego_covariance(set, &f, s, cov);
+    put_spread(cfg, definite ? cov : NULL, result);
+}
+
+/* --- the published estimates ------------------------------------------------------------------------------------ */
+
+static void solve_paper(const evs_egomotion_config_t *cfg, const ego_call_t *call, evs_egomotion_result_t *result)
+{
+    const ego_set_t *const set = &call->set;
+    const bool joint = cfg->method == EVS_EGOMOTION_ERL;
+    evs_scaled_t cov[3];
+    const bool definite = ego_paper(set, joint, call->likelihood, result, cov);
+    ego_repack(set, call->flow, call->n, result);
+    const uint32_t noise = judge(set, result);
+    if (!joint && ego_is_rotation(set, result->v_q30, kernel_scale(noise))) { result->flags |= EVS_EGOMOTION_ROTATION; }
+    put_spread(cfg, definite ? cov : NULL, result);
 }
 
 /* --- the call --------------------------------------------------------------------------------------------------- */
@@ -142,16 +222,25 @@ evs_status_t evs_egomotion_solve(const evs_egomotion_config_t *cfg, const evs_eg
         return EVS_ERR_NULL;
     }
     if (!config_ok(cfg)) { return EVS_ERR_ARG; }
-    if ((n > EVS_EGOMOTION_N_MAX) || (n_scratch < EVS_EGOMOTION_BYTES(n)) || (((uintptr_t)scratch & 3u) != 0u)) {
+    const bool robust = cfg->method == EVS_EGOMOTION_ROBUST;
+    const size_t n_needed = (n == 0u) ? 0u : (robust ? EVS_EGOMOTION_BYTES(n) : EVS_EGOMOTION_PAPER_BYTES(n));
+    if ((n > EVS_EGOMOTION_N_MAX) || (n_scratch < n_needed) || (((uintptr_t)scratch & 3u) != 0u)) {
         return EVS_ERR_SIZE;
     }
-    ego_set_t set = {.vec = scratch, .key = (uint16_t *)((ego_vector_t *)scratch + n), .n = 0u, .one_bits = 13u};
+    ego_call_t call = {.set = {.subset = scratch, .one_bits = 13u}, .flow = flow, .n = n};
+    if (n > 0u) {
+        call.set.vec = (ego_vector_t *)(call.set.subset + 1);
+        call.likelihood = (uint32_t *)(void *)(call.set.vec + n); /* 8 n bytes on: still aligned */
+        call.set.key = robust ? (uint16_t *)call.likelihood : (uint16_t *)(call.likelihood + n);
+    }
     evs_egomotion_result_t r = {.v_q30 = {0, 0, EVS_ONE_Q30}, .sigma_rad_q28 = PI_Q28};
-    ego_pack(&set, flow, n, &r);
-    if (set.n == 0u) {
+    ego_pack(&call.set, flow, n, &r);
+    if (call.set.n == 0u) {
         r.flags = EVS_EGOMOTION_FEW | EVS_EGOMOTION_STILL;
+    } else if (robust) {
+        solve_robust(cfg, &call, &r);
     } else {
-        solve_robust(cfg, &set, &r);
+        solve_paper(cfg, &call, &r);
     }
     if (r.flags == 0u) {
         r.flags = EVS_EGOMOTION_VALID;

@@ -71,6 +71,37 @@ static int64_t to_steps(const evs_egomotion_result_t *scale, int32_t q24)
 
 static uint64_t magnitude(int64_t x) { return (uint64_t)((x < 0) ? -x : x); }
 
+static int32_t without(int32_t flow_q24, int64_t by_q52)
+{
+    return evs_sat32((int64_t)flow_q24 - evs_shr_r64(by_q52, 28u));
+}
+
+static void derotate(const evs_vec3_t w, const evs_egomotion_flow_t *f, int32_t uv_q24[2])
+{
+    const int64_t xy = ((int64_t)f->x_q24 * f->y_q24) >> 24; /* < 2^31 */
+    const int64_t xx = (INT64_C(1) << 24) + (((int64_t)f->x_q24 * f->x_q24) >> 24);
+    const int64_t yy = (INT64_C(1) << 24) + (((int64_t)f->y_q24 * f->y_q24) >> 24);
+    uv_q24[0] = without(f->u_q24, xy * w.x - xx * w.y + (int64_t)f->y_q24 * w.z);
+    uv_q24[1] = without(f->v_q24, yy * w.x - xy * w.y - (int64_t)f->x_q24 * w.z);
+}
+
+/* To at most EGO_CLIP, keeping the direction. */
+static void shorten(uint64_t longer, int64_t *u, int64_t *v)
+{
+    if (longer >= (UINT64_C(1) << 30)) { /* keep the squares in range */
+        const unsigned down = 34u - evs_clz64(longer);
+        *u >>= down;
+        *v >>= down;
+    }
+    const uint64_t sq = (uint64_t)(*u * *u) + (uint64_t)(*v * *v);
+    if (sq <= (uint64_t)EGO_CLIP * EGO_CLIP) { return; }
+    unsigned shift;
+    const uint32_t r = evs_rsqrt_u64(sq, &shift);                     /* 1 / length = r 2^-shift, shift >= 44 */
+    const int64_t factor = (int64_t)(((uint64_t)r * EGO_CLIP) >> 15); /* < 2^30, and so are u and v */
+    *u = evs_shr_r64(*u * factor, shift - 15u);
+    *v = evs_shr_r64(*v * factor, shift - 15u);
+}
+
 bool ego_pack_one(const evs_egomotion_result_t *scale, const evs_egomotion_flow_t *flow, ego_vector_t *packed)
 {
     if (!position_ok(flow) || is_still(flow)) { return false; }
@@ -78,22 +109,13 @@ bool ego_pack_one(const evs_egomotion_result_t *scale, const evs_egomotion_flow_
     const unsigned shift = 10u + scale->position_shift_;
     packed->x = evs_sat16(evs_shr_r(flow->x_q24, shift));
     packed->y = evs_sat16(evs_shr_r(flow->y_q24, shift));
-    int64_t u = to_steps(scale, flow->u_q24);
-    int64_t v = to_steps(scale, flow->v_q24);
+    int32_t uv_q24[2] = {flow->u_q24, flow->v_q24};
+    const evs_vec3_t w = scale->rotation_rad_q28;
+    if ((w.x != 0) || (w.y != 0) || (w.z != 0)) { derotate(w, flow, uv_q24); }
+    int64_t u = to_steps(scale, uv_q24[0]);
+    int64_t v = to_steps(scale, uv_q24[1]);
     const uint64_t longer = (magnitude(u) > magnitude(v)) ? magnitude(u) : magnitude(v);
-    if (longer >= (UINT64_C(1) << 30)) { /* keep the squares in range */
-        const unsigned down = 34u - evs_clz64(longer);
-        u >>= down;
-        v >>= down;
-    }
-    const uint64_t sq = (uint64_t)(u * u) + (uint64_t)(v * v);
-    if (sq > (uint64_t)EGO_CLIP * EGO_CLIP) {
-        unsigned root_shift;
-        const uint32_t r = evs_rsqrt_u64(sq, &root_shift); /* 1 / length = r 2^-root_shift */
-        const int64_t factor = (int64_t)r * EGO_CLIP;      /* up to 2^45: take 30 bits */
-        u = evs_shr_r64(u * (factor >> 15), root_shift - 15u);
-        v = evs_shr_r64(v * (factor >> 15), root_shift - 15u);
-    }
+    if (longer > (uint64_t)EGO_CLIP * 181u / 256u) { shorten(longer, &u, &v); } /* else below EGO_CLIP / sqrt(2) */
     packed->u = (int16_t)u;
     packed->v = (int16_t)v;
     return true;
@@ -103,6 +125,23 @@ uint32_t ego_steps_to_q24(const evs_egomotion_result_t *scale, uint32_t steps)
 {
     const uint64_t x = ((uint64_t)steps * scale->median_flow_q24) >> EGO_MEDIAN_BITS;
     return (x < UINT32_MAX) ? (uint32_t)x : UINT32_MAX;
+}
+
+static void lay_grid(ego_set_t *set)
+{
+    int32_t right = INT16_MIN;
+    int32_t bottom = INT16_MIN;
+    set->left = INT16_MAX;
+    set->top = INT16_MAX;
+    for (uint32_t i = 0u; i < set->n; i++) {
+        const ego_vector_t *const p = &set->vec[i];
+        if (p->x < set->left) { set->left = p->x; }
+        if (p->x > right) { right = p->x; }
+        if (p->y < set->top) { set->top = p->y; }
+        if (p->y > bottom) { bottom = p->y; }
+    }
+    set->per_column_q16 = (EGO_COLUMNS << 16) / (uint32_t)(right - set->left + 1);
+    set->per_row_q16 = (EGO_ROWS << 16) / (uint32_t)(bottom - set->top + 1);
 }
 
 void ego_pack(ego_set_t *set, const evs_egomotion_flow_t *flow, size_t n, evs_egomotion_result_t *result)
@@ -131,8 +170,14 @@ void ego_pack(ego_set_t *set, const evs_egomotion_flow_t *flow, size_t n, evs_eg
         (uint8_t)((reach >= (UINT32_C(4) << 24)) ? 2u : ((reach >= (UINT32_C(2) << 24)) ? 1u : 0u));
     set->one_bits = 13u - result->position_shift_;
 
+    ego_repack(set, flow, n, result);
+    lay_grid(set);
+}
+
+void ego_repack(const ego_set_t *set, const evs_egomotion_flow_t *flow, size_t n, const evs_egomotion_result_t *scale)
+{
     ego_vector_t *out = set->vec;
     for (size_t i = 0u; i < n; i++) {
-        if (ego_pack_one(result, &flow[i], out)) { out++; }
+        if (ego_pack_one(scale, &flow[i], out)) { out++; }
     }
 }

@@ -4,7 +4,7 @@
  * @file  evs_egomotion_private.h
  * @brief Private: what the parts of the ego-motion solver share.
  *
- * Formats. Positions (x, y, 1) are int16 with 1 = 2^(one_bits + 1); products with a unit vector in Q14, divided by 2^15, have
+ * Formats. Positions (x, y, 1) are int16 with 1 = 2^(one_bits + 1); products with a unit vector in Q15, divided by 2^16, have
  * one_bits fractional bits. With one_bits = 13, 12, 11 positions reach 2, 4, 8, and each such product fits an int16.
  * Flow is int16 in steps of which the median length has 2^10; longer than 8 medians is shortened to that, so that an
  * outlier does not eat the bits of the others.
@@ -25,6 +25,8 @@ enum {
     EGO_INV_BITS = 14 /* of 1 / |a|^2 */
 };
 
+#define EGO_ROTATION_MAX (INT32_C(1) << 29) /* 2 rad */
+
 typedef struct {
     int16_t x;
     int16_t y;
@@ -32,13 +34,39 @@ typedef struct {
     int16_t v;
 } ego_vector_t;
 
+/* Some of them for the search, a row per coordinate. */
+typedef struct {
+    int16_t x[EGO_SUBSET];
+    int16_t y[EGO_SUBSET];
+    int16_t u[EGO_SUBSET];
+    int16_t v[EGO_SUBSET];
+} ego_subset_t;
+
+EVS_STATIC_ASSERT(sizeof(ego_subset_t) + sizeof(ego_vector_t) + sizeof(uint16_t) <= EVS_EGOMOTION_BYTES(1),
+                  "the macro tells what is used");
+
 /* The vectors of one call, packed, and what is told of all of them. */
 typedef struct {
+    ego_subset_t *subset;
     ego_vector_t *vec;
     uint16_t *key; /* one per vector: room for what is to be ordered */
     uint32_t n;
     unsigned one_bits;
+    int32_t left; /* a grid of cells over the positions: see ego_cell() */
+    int32_t top;
+    uint32_t per_column_q16;
+    uint32_t per_row_q16;
 } ego_set_t;
+
+/* Vectors of one cell err together, it is supposed: a moving object, or windows of the tracker that overlap. */
+enum { EGO_COLUMNS = 4, EGO_ROWS = 3, EGO_CELLS = EGO_COLUMNS * EGO_ROWS };
+
+static inline uint32_t ego_cell(const ego_set_t *set, const ego_vector_t *p)
+{
+    const uint32_t column = ((uint32_t)(p->x - set->left) * set->per_column_q16) >> 16;
+    const uint32_t row = ((uint32_t)(p->y - set->top) * set->per_row_q16) >> 16;
+    return row * EGO_COLUMNS + column;
+}
 
 /* A unit vector and two that complete it to a right-handed frame: b0 x b1 = v. Q30. */
 typedef struct {
@@ -63,21 +91,26 @@ typedef struct {
     uint32_t a2;
 } ego_view_t;
 
-static inline int32_t ego_q14(int32_t q30) { return evs_shr_r(q30, 16u); }
+/* A component of a unit vector to Q15, 1.0 to the largest number below. */
+static inline int32_t ego_q15(int32_t q30)
+{
+    const int32_t q15 = evs_shr_r(evs_clamp(q30, -EVS_ONE_Q30, EVS_ONE_Q30), 15u);
+    return (q15 > INT16_MAX) ? INT16_MAX : q15;
+}
 
 static inline ego_dir_t ego_dir(const ego_set_t *set, evs_vec3_t v_q30)
 {
     const int32_t one = INT32_C(2) << set->one_bits;
-    const ego_dir_t dir = {ego_q14(v_q30.x) * one, ego_q14(v_q30.y) * one, ego_q14(v_q30.z)};
+    const ego_dir_t dir = {ego_q15(v_q30.x) * one, ego_q15(v_q30.y) * one, ego_q15(v_q30.z)};
     return dir;
 }
 
-/* |c|, |d| < 2^28.5; a2 < 2^30. */
+/* |a| < 2^14.6 and the flow is not longer than EGO_CLIP: |c|, |d| < 2^27.6; a2 < 2^29.2. */
 static inline ego_view_t ego_view(const ego_vector_t *p, ego_dir_t dir)
 {
     ego_view_t w;
-    w.ax = (p->x * dir.z - dir.x) >> 15;
-    w.ay = (p->y * dir.z - dir.y) >> 15;
+    w.ax = (p->x * dir.z - dir.x) >> 16;
+    w.ay = (p->y * dir.z - dir.y) >> 16;
     w.c = p->u * w.ay - p->v * w.ax;
     w.d = p->u * w.ax + p->v * w.ay;
     w.a2 = (uint32_t)(w.ax * w.ax + w.ay * w.ay);
@@ -90,10 +123,17 @@ static inline bool ego_near_focus(const ego_set_t *set, const ego_view_t *w)
     return w->a2 < (UINT32_C(1) << (2u * set->one_bits - 10u));
 }
 
-/* 1 / |a|^2 with EGO_INV_BITS; at most 2^24 unless near the focus. */
+/* 1 / |a|^2 with EGO_INV_BITS; below 2^24 unless near the focus. */
 static inline uint32_t ego_inv_a2(const ego_set_t *set, uint32_t a2)
 {
-    return UINT32_MAX / (a2 >> (2u * set->one_bits - 18u));
+    const uint32_t inv = UINT32_MAX / (a2 >> (2u * set->one_bits - 18u));
+    return (inv < (UINT32_C(1) << 24)) ? inv : (UINT32_C(1) << 24) - 1u;
+}
+
+/* c / |a|^2 in 1/4 steps: the residual over |a|, below 2^27.6. */
+static inline int32_t ego_over_a2_q2(const ego_set_t *set, int32_t c, uint32_t inv)
+{
+    return evs_mul_hi(c * 8, (int32_t)(inv << (17u - set->one_bits)));
 }
 
 /* A squared scale, for weights: s2 = (s / 2^e)^2 in Q28 with s in [2^e, 2^(e+1)), and the shift that makes c alike. */
@@ -115,16 +155,133 @@ static inline uint32_t ego_share_q15(ego_scale_t scale, const ego_view_t *w)
     return (k << up) / ((sum << up) >> 15);
 }
 
-static inline int32_t ego_clip16(int64_t x)
+static inline int32_t ego_clip16(int32_t x) { return evs_clamp(x, INT16_MIN, INT16_MAX); }
+
+/* How a vector's residual r depends on a step (d0, d1): |a| dr = j0 d0 + j1 d1, in steps. */
+typedef struct {
+    int32_t j0; /* |j| < 2^18 */
+    int32_t j1;
+} ego_slope_t;
+
+static inline ego_slope_t ego_slope(const ego_set_t *set, const ego_vector_t *p, int32_t d, uint32_t inv, ego_dir_t b0,
+                                    ego_dir_t b1)
 {
-    if (x > INT16_MAX) { return INT16_MAX; }
-    return (x < INT16_MIN) ? INT16_MIN : (int32_t)x;
+    const int32_t rho = ego_clip16(ego_over_a2_q2(set, d, inv) >> 2);
+    const int32_t p0 = (p->x * b0.x + p->y * b0.y + b0.z) >> 16;
+    const int32_t p1 = (p->x * b1.x + p->y * b1.y + b1.z) >> 16;
+    const ego_slope_t s = {(rho * p1) >> set->one_bits, -((rho * p0) >> set->one_bits)};
+    return s;
+}
+
+/* w J / |a|: twice 15 bits of share make the weight, in Q30; |.| < 2^28. */
+static inline int32_t ego_weigh(uint32_t weight_q30, uint32_t inv, int32_t j)
+{
+    return evs_mul_hi((int32_t)evs_mul_hi_u(weight_q30, inv << 8), j * 4096);
+}
+
+/* A direction whose product with (x, y, 1) is wanted: here z, not x and y, is multiplied by "one". */
+static inline ego_dir_t ego_plane_dir(const ego_set_t *set, evs_vec3_t b_q30)
+{
+    const ego_dir_t dir = {ego_q15(b_q30.x), ego_q15(b_q30.y), ego_q15(b_q30.z) * (INT32_C(2) << set->one_bits)};
+    return dir;
+}
+
+/* A direction with its tangent plane, and a kernel, ready for the inner loops. */
+typedef struct {
+    ego_dir_t v;
+    ego_dir_t b0;
+    ego_dir_t b1;
+    ego_scale_t scale;
+} ego_loop_t;
+
+static inline ego_loop_t ego_loop(const ego_set_t *set, const ego_frame_t *f, uint32_t s)
+{
+    const ego_loop_t loop = {ego_dir(set, f->v), ego_plane_dir(set, f->b0), ego_plane_dir(set, f->b1), ego_scale(s)};
+    return loop;
+}
+
+/* What one vector adds to the normal equations. */
+typedef struct {
+    ego_slope_t j; /* |a| J */
+    int32_t k0;    /* w J / |a| */
+    int32_t k1;
+    int32_t wr_q2;    /* w r / |a| */
+    int32_t bend_q15; /* psi' / w = 4 q - 3, q being the share whose square is w */
+    ego_view_t view;
+    uint32_t weight_q30;
+    uint32_t inv;
+} ego_pull_t;
+
+/* False: the vector points the wrong way or is too close to the focus. */
+static inline bool ego_pull(const ego_set_t *set, const ego_vector_t *p, const ego_loop_t *loop, ego_pull_t *out)
+{
+    const ego_view_t w = ego_view(p, loop->v);
+    if ((w.d <= 0) || ego_near_focus(set, &w)) { return false; }
+    const uint32_t share = ego_share_q15(loop->scale, &w);
+    const uint32_t weight_q30 = share * share;
+    const uint32_t inv = ego_inv_a2(set, w.a2);
+    out->j = ego_slope(set, p, w.d, inv, loop->b0, loop->b1);
+    out->k0 = ego_weigh(weight_q30, inv, out->j.j0);
+    out->k1 = ego_weigh(weight_q30, inv, out->j.j1);
+    out->wr_q2 = evs_mul_hi((int32_t)weight_q30, ego_over_a2_q2(set, w.c, inv) * 4);
+    out->bend_q15 = 4 * (int32_t)share - 3 * 32768;
+    out->view = w;
+    out->weight_q30 = weight_q30;
+    out->inv = inv;
+    return true;
+}
+
+/* The gradient that a vector adds, in 4 steps^2; limited so that 2^16 of them fit 39 bits. */
+static inline int32_t ego_gradient(int32_t wr_q2, int32_t j)
+{
+    const int64_t z = ((int64_t)wr_q2 * j) >> 4;
+    const int64_t limit = INT64_C(1) << 23;
+    return (int32_t)((z > limit) ? limit : ((z < -limit) ? -limit : z));
+}
+
+/* Flow of a unit rotation about each axis, at 1 = 2^(one_bits + 1): u = bu w, v = bv w. */
+typedef struct {
+    int32_t bu[3];
+    int32_t bv[3];
+} ego_rows_t;
+
+static inline ego_rows_t ego_rows(const ego_set_t *set, const ego_vector_t *p)
+{
+    const unsigned shift = set->one_bits + 1u;
+    const int32_t one = INT32_C(1) << shift;
+    const int32_t xy = (p->x * p->y) >> shift;
+    const ego_rows_t r = {{xy, -one - ((p->x * p->x) >> shift), p->y}, {one + ((p->y * p->y) >> shift), -xy, -p->x}};
+    return r;
+}
+
+/* Rotation in 1/256 steps. */
+typedef struct {
+    int32_t w_q8[3];
+} ego_turn_t;
+
+enum { EGO_TURN_MAX = 1 << 22 };
+
+/* What is left of the flow without the turn. */
+static inline void ego_left_over(const ego_set_t *set, const ego_vector_t *p, const ego_rows_t *r, const ego_turn_t *t,
+                                 int32_t left[2])
+{
+    const unsigned shift = set->one_bits + 9u;
+    int64_t u = 0;
+    int64_t v = 0;
+    for (unsigned k = 0u; k < 3u; k++) {
+        u += (int64_t)r->bu[k] * t->w_q8[k];
+        v += (int64_t)r->bv[k] * t->w_q8[k];
+    }
+    left[0] = ego_clip16(p->u - evs_sat32(u >> shift));
+    left[1] = ego_clip16(p->v - evs_sat32(v >> shift));
 }
 
 /* --- evs_egomotion_pack.c --- */
 
 /* Count, scale and pack the vectors; fills the counts, the median and the private members of the result. */
 void ego_pack(ego_set_t *set, const evs_egomotion_flow_t *flow, size_t n, evs_egomotion_result_t *result);
+/* Pack them again, with the rotation of the result taken out. */
+void ego_repack(const ego_set_t *set, const evs_egomotion_flow_t *flow, size_t n, const evs_egomotion_result_t *scale);
 /* Pack one vector as ego_pack() did; false where it was left out. */
 bool ego_pack_one(const evs_egomotion_result_t *scale, const evs_egomotion_flow_t *flow, ego_vector_t *packed);
 /* Steps to K^-1 px, Q24. */
@@ -147,12 +304,44 @@ ego_frame_t ego_frame(evs_vec3_t v_q30);
 evs_vec3_t ego_move(const ego_frame_t *f, evs_scaled_t d0, evs_scaled_t d1);
 /* A Gauss-Newton step with Geman-McClure weights of scale s on every stride-th vector; false: no step was possible. */
 bool ego_step(const ego_set_t *set, uint32_t s, uint32_t stride, evs_vec3_t *v_q30);
-/* Robust 1 sigma of the residuals in steps. */
-uint32_t ego_noise(const ego_set_t *set, evs_vec3_t v_q30);
-/* Whether r is within limit steps and d positive. */
-bool ego_agrees(const ego_vector_t *p, ego_dir_t dir, uint32_t limit);
+/* Robust 1 sigma of the residuals in steps, from at most n_max vectors. */
+uint32_t ego_noise(const ego_set_t *set, evs_vec3_t v_q30, uint32_t n_max);
 /* Sandwich covariance of v under the kernel of scale s: the sum is in the tangent plane 00, 01, 11, rad^2.
  * False: not positive definite. */
 bool ego_covariance(const ego_set_t *set, const ego_frame_t *f, uint32_t s, evs_scaled_t cov[3]);
+/* The first two rows and columns of H^-1 M H^-1, as above; lower triangles by rows. False: H is not positive definite. */
+bool ego_sandwich(const evs_scaled_t *h, const evs_scaled_t *m, unsigned dim, evs_scaled_t cov[3]);
+
+/* Variance of the gradient, from its sums z[EGO_CELLS][dim] over the cells. */
+void ego_spread(const int64_t *z, unsigned dim, evs_scaled_t *m);
+
+/* --- evs_egomotion_rotation.c --- */
+
+/* A rotation that is estimated together with v. */
+typedef struct {
+    evs_vec3_t rad_q28;
+    evs_scaled_t prior; /* (noise / prior's sigma)^2, in the unit of the Hessian */
+} ego_rotation_t;
+
+/* (noise / sigma)^2 in that unit. */
+evs_scaled_t ego_rotation_prior(const ego_set_t *set, const evs_egomotion_result_t *scale, uint32_t noise,
+                                int32_t sigma_rad_q28);
+/* As ego_step(), for both. The set must be packed with rot->rad_q28 taken out. */
+bool ego_step_rotation(const ego_set_t *set, const evs_egomotion_result_t *scale, uint32_t s, evs_vec3_t *v_q30,
+                       ego_rotation_t *rot);
+/* As ego_covariance(), with the rotation's share. */
+bool ego_covariance_rotation(const ego_set_t *set, const ego_frame_t *f, uint32_t s, uint32_t noise, evs_scaled_t prior,
+                             evs_scaled_t cov[3]);
+/* What one unit of the rotation's slopes is in rad. */
+evs_scaled_t ego_rotation_unit(const ego_set_t *set, const evs_egomotion_result_t *scale);
+/* Whether a rotation alone explains the vectors as well as v does, under a kernel of scale s. */
+bool ego_is_rotation(const ego_set_t *set, evs_vec3_t v_q30, uint32_t s);
+
+/* --- evs_egomotion_paper.c --- */
+
+/* The published estimators: v, and with `joint` the rotation, into the result; cov as of ego_covariance(). The set is packed
+ * without rotation. `likelihood` has room for set->n. False: no minimum with a covariance. */
+bool ego_paper(const ego_set_t *set, bool joint, uint32_t *likelihood, evs_egomotion_result_t *result,
+               evs_scaled_t cov[3]);
 
 #endif

@@ -3,6 +3,8 @@
 /* Gauss-Newton on the residual across the flow direction, in the tangent plane of v, and what is known of its result. */
 #include "evs_egomotion_private.h"
 
+#include <string.h>
+
 /* --- frames ----------------------------------------------------------------------------------------------------- */
 
 static evs_vec3_t unit_or(evs_vec3_t v, evs_vec3_t otherwise)
@@ -49,79 +51,40 @@ ego_scale_t ego_scale(uint32_t s)
     return scale;
 }
 
-/* How a vector's residual r depends on a step (d0, d1): |a| dr = j0 d0 + j1 d1, in steps. And r / |a| in 1/16 steps. */
-typedef struct {
-    int32_t j0; /* |j| < 2^18 */
-    int32_t j1;
-    int32_t r_per_a_q4; /* below 2^30 */
-} slope_t;
-
-static slope_t slope(const ego_set_t *set, const ego_vector_t *p, const ego_view_t *w, uint32_t inv, ego_dir_t b0,
-                     ego_dir_t b1)
-{
-    const unsigned shift = EGO_INV_BITS + set->one_bits;
-    const int32_t rho = ego_clip16(((int64_t)w->d * (int64_t)inv) >> shift);
-    const int32_t p0 = (p->x * b0.x + p->y * b0.y + b0.z) >> 15;
-    const int32_t p1 = (p->x * b1.x + p->y * b1.y + b1.z) >> 15;
-    slope_t s;
-    s.r_per_a_q4 = (int32_t)(((int64_t)w->c * (int64_t)inv) >> (shift - 4u)); /* |c| < 2^28.5, inv <= 2^24: < 2^30 */
-    s.j0 = (rho * p1) >> set->one_bits;
-    s.j1 = -((rho * p0) >> set->one_bits);
-    return s;
-}
-
-/* A direction whose product with (x, y, 1) is wanted: here z, not x and y, is multiplied by "one". */
-static ego_dir_t plane_dir(const ego_set_t *set, evs_vec3_t b_q30)
-{
-    const ego_dir_t dir = {ego_q14(b_q30.x), ego_q14(b_q30.y), ego_q14(b_q30.z) * (INT32_C(2) << set->one_bits)};
-    return dir;
-}
-
 /* --- steps ------------------------------------------------------------------------------------------------------ */
 
 bool ego_step(const ego_set_t *set, uint32_t s, uint32_t stride, evs_vec3_t *v_q30)
 {
     const ego_frame_t f = ego_frame(*v_q30);
-    const ego_dir_t dir = ego_dir(set, f.v);
-    const ego_dir_t b0 = plane_dir(set, f.b0);
-    const ego_dir_t b1 = plane_dir(set, f.b1);
-    const ego_scale_t scale = ego_scale(s);
-    int64_t h00 = 0, h01 = 0, h11 = 0, g0 = 0, g1 = 0;
+    const ego_loop_t loop = ego_loop(set, &f, s);
+    int64_t h00 = 0, h01 = 0, h11 = 0; /* sum of w J J': the Hessian of Gauss-Newton */
+    int64_t g0_q2 = 0, g1_q2 = 0;      /* sum of w r J: the gradient */
     for (uint32_t i = 0u; i < set->n; i += stride) {
-        const ego_vector_t *const p = &set->vec[i];
-        const ego_view_t w = ego_view(p, dir);
-        if ((w.d <= 0) || ego_near_focus(set, &w)) { continue; }
-        const uint32_t share = ego_share_q15(scale, &w);
-        const uint32_t weight = (share * share) >> 15;
-        const uint32_t inv = ego_inv_a2(set, w.a2);
-        const slope_t j = slope(set, p, &w, inv, b0, b1);
-        const int64_t weight_inv = (int64_t)(((uint64_t)weight * inv) >> 15);
-        const int32_t k0 = (int32_t)((weight_inv * j.j0) >> EGO_INV_BITS); /* |j| < 2^18, weight_inv <= 2^24 */
-        const int32_t k1 = (int32_t)((weight_inv * j.j1) >> EGO_INV_BITS);
-        const int32_t wr_q4 = (int32_t)evs_shr_r64((int64_t)weight * j.r_per_a_q4, 15u);
-        h00 += (int64_t)k0 * j.j0;
-        h01 += (int64_t)k0 * j.j1;
-        h11 += (int64_t)k1 * j.j1;
-        g0 += (int64_t)wr_q4 * j.j0;
-        g1 += (int64_t)wr_q4 * j.j1;
+        ego_pull_t a;
+        if (!ego_pull(set, &set->vec[i], &loop, &a)) { continue; }
+        h00 += (int64_t)a.k0 * a.j.j0;
+        h01 += (int64_t)a.k0 * a.j.j1;
+        h11 += (int64_t)a.k1 * a.j.j1;
+        g0_q2 += (int64_t)a.wr_q2 * a.j.j0;
+        g1_q2 += (int64_t)a.wr_q2 * a.j.j1;
     }
     evs_scaled_t h[3] = {evs_scaled(h00, 0), evs_scaled(h01, 0), evs_scaled(h11, 0)};
-    evs_scaled_t step[2] = {evs_scaled(-g0, -4), evs_scaled(-g1, -4)};
+    evs_scaled_t step[2] = {evs_scaled(-g0_q2, -2), evs_scaled(-g1_q2, -2)};
     if (!evs_scaled_solve(h, step, 2u)) { return false; }
     *v_q30 = ego_move(&f, step[0], step[1]);
     return true;
 }
 
-uint32_t ego_noise(const ego_set_t *set, evs_vec3_t v_q30)
+uint32_t ego_noise(const ego_set_t *set, evs_vec3_t v_q30, uint32_t n_max)
 {
     const ego_dir_t dir = ego_dir(set, v_q30);
-    const unsigned shift = EGO_INV_BITS + set->one_bits - 4u; /* r / |a| in 1/16 steps */
+    const uint32_t stride = (set->n + n_max - 1u) / n_max;
     uint32_t m = 0u;
-    for (uint32_t i = 0u; i < set->n; i++) {
+    for (uint32_t i = 0u; i < set->n; i += stride) {
         const ego_view_t w = ego_view(&set->vec[i], dir);
         if (ego_near_focus(set, &w)) { continue; }
-        const int64_t r_per_a = ((int64_t)w.c * (int64_t)ego_inv_a2(set, w.a2)) >> shift; /* |.| < 2^30 */
-        set->key[m++] = ego_key((uint64_t)(w.c * r_per_a) >> set->one_bits);              /* 16 r^2 */
+        const int32_t r_per_a_q2 = ego_over_a2_q2(set, w.c, ego_inv_a2(set, w.a2));
+        set->key[m++] = ego_key((uint64_t)((int64_t)w.c * r_per_a_q2) >> (set->one_bits - 2u)); /* 16 r^2 */
     }
     if (m == 0u) { return EGO_CLIP; }
     /* The lower quartile instead of the median: |r| of a normal distribution lies below 0.3186 sigma for a quarter. With half
@@ -130,80 +93,95 @@ uint32_t ego_noise(const ego_set_t *set, evs_vec3_t v_q30)
     return (uint32_t)(((uint64_t)evs_sqrt_u64(r2_q4 << 16) * 205672u) >> 26);
 }
 
-bool ego_agrees(const ego_vector_t *p, ego_dir_t dir, uint32_t limit)
-{
-    const ego_view_t w = ego_view(p, dir);
-    if (w.d <= 0) { return false; }
-    const uint64_t c2 = (uint64_t)((int64_t)w.c * w.c);
-    return c2 <= (uint64_t)w.a2 * limit * limit;
-}
-
 /* --- covariance ------------------------------------------------------------------------------------------------- */
 
-static int64_t gradient(int32_t wr_q4, int32_t j) /* in 4 steps^2; with the limit 2^16 squares of it fit 64 bits */
+static unsigned at(unsigned i, unsigned j) { return (i >= j) ? i * (i + 1u) / 2u + j : j * (j + 1u) / 2u + i; }
+
+/* x' M y for a symmetric M. */
+static evs_scaled_t form(const evs_scaled_t *m, const evs_scaled_t *x, const evs_scaled_t *y, unsigned dim)
 {
-    const int64_t z = ((int64_t)wr_q4 * j) >> 6;
-    const int64_t limit = INT64_C(1) << 23;
-    return (z > limit) ? limit : ((z < -limit) ? -limit : z);
+    evs_scaled_t sum = {0, 0};
+    for (unsigned i = 0u; i < dim; i++) {
+        for (unsigned j = 0u; j < dim; j++) {
+            sum = evs_scaled_add(sum, evs_scaled_mul(m[at(i, j)], evs_scaled_mul(x[i], y[j])));
+        }
+    }
+    return sum;
+}
+
+void ego_spread(const int64_t *z, unsigned dim, evs_scaled_t *m)
+{
+    int32_t n_used = 0;
+    for (unsigned i = 0u; i < dim * (dim + 1u) / 2u; i++) { m[i] = evs_scaled(0, 0); }
+    for (unsigned c = 0u; c < EGO_CELLS; c++, z += dim) {
+        unsigned k = 0u;
+        int64_t any = 0;
+        for (unsigned i = 0u; i < dim; i++) {
+            any |= z[i];
+            for (unsigned j = 0u; j <= i; j++, k++) {
+                m[k] = evs_scaled_add(m[k], evs_scaled_mul(evs_scaled(z[i], 2), evs_scaled(z[j], 2)));
+            }
+        }
+        n_used += (any != 0) ? 1 : 0;
+    }
+    /* the sum over all cells is zero at the minimum, in as many directions as were estimated */
+    const int32_t free = (n_used > (int32_t)dim) ? n_used - (int32_t)dim : 1;
+    const evs_scaled_t correction = evs_scaled_div(evs_scaled(n_used, 0), evs_scaled(free, 0));
+    for (unsigned i = 0u; i < dim * (dim + 1u) / 2u; i++) { m[i] = evs_scaled_mul(m[i], correction); }
+}
+
+bool ego_sandwich(const evs_scaled_t *h, const evs_scaled_t *m, unsigned dim, evs_scaled_t cov[3])
+{
+    evs_scaled_t x[2][EVS_SCALED_DIM_MAX] = {{{0, 0}}};
+    for (unsigned i = 0u; i < 2u; i++) { /* the first two columns of H^-1 */
+        evs_scaled_t factors[EVS_SCALED_DIM_MAX * (EVS_SCALED_DIM_MAX + 1u) / 2u];
+        memcpy(factors, h, dim * (dim + 1u) / 2u * sizeof factors[0]);
+        x[i][i] = evs_scaled(1, 0);
+        if (!evs_scaled_solve(factors, x[i], dim)) { return false; }
+    }
+    cov[0] = form(m, x[0], x[0], dim);
+    cov[1] = form(m, x[0], x[1], dim);
+    cov[2] = form(m, x[1], x[1], dim);
+    return true;
 }
 
 bool ego_covariance(const ego_set_t *set, const ego_frame_t *f, uint32_t s, evs_scaled_t cov[3])
 {
-    const ego_dir_t dir = ego_dir(set, f->v);
-    const ego_dir_t b0 = plane_dir(set, f->b0);
-    const ego_dir_t b1 = plane_dir(set, f->b1);
-    const ego_scale_t scale = ego_scale(s);
-    int64_t h00 = 0, h01 = 0, h11 = 0; /* sum of w J J': the Hessian of Gauss-Newton */
-    int64_t m00 = 0, m01 = 0, m11 = 0; /* sum of w^2 r^2 J J': the variance of the gradient */
-    int64_t curvature = 0;             /* sum of psi' J'J: how much flatter the cost really is */
+    const ego_loop_t loop = ego_loop(set, f, s);
+    int64_t h00 = 0, h01 = 0, h11 = 0;
+    int64_t curvature_q15 = 0;       /* sum of psi' |J|^2: the trace of the true Hessian */
+    int64_t z[EGO_CELLS][2] = {{0}}; /* the gradient, by cells */
+    uint64_t spread = 0u;            /* sum of its squares, vector by vector */
     for (uint32_t i = 0u; i < set->n; i++) {
-        const ego_vector_t *const p = &set->vec[i];
-        const ego_view_t w = ego_view(p, dir);
-        if ((w.d <= 0) || ego_near_focus(set, &w)) { continue; }
-        const int32_t share = (int32_t)ego_share_q15(scale, &w);
-        const int32_t weight = (share * share) >> 15;
-        const int32_t bend = (weight * ((4 * share - 3 * 32768) / 4)) >> 13; /* psi' = q^2 (4 q - 3) */
-        const uint32_t inv = ego_inv_a2(set, w.a2);
-        const slope_t j = slope(set, p, &w, inv, b0, b1);
-        const int32_t i0 = (int32_t)(((int64_t)inv * j.j0) >> EGO_INV_BITS);
-        const int32_t i1 = (int32_t)(((int64_t)inv * j.j1) >> EGO_INV_BITS);
-        const int64_t jj00 = (int64_t)i0 * j.j0; /* < 2^45 */
-        const int64_t jj11 = (int64_t)i1 * j.j1;
-        h00 += (jj00 * weight) >> 15;
-        h01 += ((int64_t)i0 * j.j1 * weight) >> 15;
-        h11 += (jj11 * weight) >> 15;
-        curvature += ((jj00 + jj11) * bend) >> 15;
-        const int32_t wr_q4 = (int32_t)evs_shr_r64((int64_t)weight * j.r_per_a_q4, 15u);
-        const int64_t z0 = gradient(wr_q4, j.j0);
-        const int64_t z1 = gradient(wr_q4, j.j1);
-        m00 += z0 * z0;
-        m01 += z0 * z1;
-        m11 += z1 * z1;
+        ego_pull_t a;
+        if (!ego_pull(set, &set->vec[i], &loop, &a)) { continue; }
+        const int64_t w00 = (int64_t)a.k0 * a.j.j0;
+        const int64_t w11 = (int64_t)a.k1 * a.j.j1;
+        h00 += w00;
+        h01 += (int64_t)a.k0 * a.j.j1;
+        h11 += w11;
+        curvature_q15 += (w00 + w11) * a.bend_q15;
+        const int64_t z0 = ego_gradient(a.wr_q2, a.j.j0);
+        const int64_t z1 = ego_gradient(a.wr_q2, a.j.j1);
+        int64_t *const cell = z[ego_cell(set, &set->vec[i])];
+        cell[0] += z0;
+        cell[1] += z1;
+        spread += (uint64_t)(z0 * z0) + (uint64_t)(z1 * z1);
     }
-    const evs_scaled_t a = evs_scaled(h00, 0);
-    const evs_scaled_t b = evs_scaled(h01, 0);
-    const evs_scaled_t c = evs_scaled(h11, 0);
-    const evs_scaled_t ac = evs_scaled_mul(a, c);
-    const evs_scaled_t det = evs_scaled_sub(ac, evs_scaled_mul(b, b));
-    const evs_scaled_t least = {ac.m, ac.e - 20};
-    if ((a.m <= 0) || (c.m <= 0) || evs_scaled_less(det, least) || (curvature <= 0)) { return false; }
-
+    if (curvature_q15 <= 0) { return false; }
     /* cov = H^-1 M H^-1 / kappa^2, kappa being the trace of the true Hessian over that of H: the true one by itself need
      * not be positive, and its inverse would be noise. */
-    const evs_scaled_t kappa = evs_scaled_div(evs_scaled(curvature, 0), evs_scaled(h00 + h11, 0));
-    const evs_scaled_t den = evs_scaled_mul(det, kappa);
-    const evs_scaled_t i00 = evs_scaled_div(c, den);
-    const evs_scaled_t i01 = evs_scaled_div(evs_scaled(-h01, 0), den);
-    const evs_scaled_t i11 = evs_scaled_div(a, den);
-    const evs_scaled_t n00 = evs_scaled(m00, 4);
-    const evs_scaled_t n01 = evs_scaled(m01, 4);
-    const evs_scaled_t n11 = evs_scaled(m11, 4);
-    const evs_scaled_t t00 = evs_scaled_add(evs_scaled_mul(i00, n00), evs_scaled_mul(i01, n01)); /* I N */
-    const evs_scaled_t t01 = evs_scaled_add(evs_scaled_mul(i00, n01), evs_scaled_mul(i01, n11));
-    const evs_scaled_t t10 = evs_scaled_add(evs_scaled_mul(i01, n00), evs_scaled_mul(i11, n01));
-    const evs_scaled_t t11 = evs_scaled_add(evs_scaled_mul(i01, n01), evs_scaled_mul(i11, n11));
-    cov[0] = evs_scaled_add(evs_scaled_mul(t00, i00), evs_scaled_mul(t01, i01)); /* I N I */
-    cov[1] = evs_scaled_add(evs_scaled_mul(t00, i01), evs_scaled_mul(t01, i11));
-    cov[2] = evs_scaled_add(evs_scaled_mul(t10, i01), evs_scaled_mul(t11, i11));
-    return true;
+    const evs_scaled_t kappa = evs_scaled_div(evs_scaled(curvature_q15, -15), evs_scaled(h00 + h11, 0));
+    const evs_scaled_t h[3] = {evs_scaled_mul(evs_scaled(h00, 0), kappa), evs_scaled_mul(evs_scaled(h01, 0), kappa),
+                               evs_scaled_mul(evs_scaled(h11, 0), kappa)};
+    evs_scaled_t m[3];
+    ego_spread(&z[0][0], 2u, m);
+    /* cells are few: should chance have made their sums small, believe the vectors */
+    const evs_scaled_t at_least = evs_scaled((int64_t)(spread >> 1), 5);
+    const evs_scaled_t trace = evs_scaled_add(m[0], m[2]);
+    if ((trace.m > 0) && evs_scaled_less(trace, at_least)) {
+        const evs_scaled_t more = evs_scaled_div(at_least, trace);
+        for (unsigned i = 0u; i < 3u; i++) { m[i] = evs_scaled_mul(m[i], more); }
+    }
+    return ego_sandwich(h, m, 2u, cov);
 }

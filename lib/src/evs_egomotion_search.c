@@ -22,22 +22,40 @@ static const int16_t HEMISPHERE[N_HYPOTHESES][3] = {
     {14234, -8064, 896},    {-5052, 15573, 640},   {-6797, -14903, 384},  {15082, 6399, 128},
 };
 
-/* How well the vectors fit a direction and its opposite: each gives 3, 2, 1 or 0 points for a residual below 1/4, 1/2 or 1
- * of the median flow, to the sign for which its inverse depth is positive. Stairs in place of a smooth kernel spare a
- * division per vector and hypothesis, and cost no accuracy. */
-static void score(const ego_set_t *set, uint32_t stride_q16, uint32_t n, ego_dir_t dir, uint32_t points[2])
+/* Every so many of the vectors, so that they come from all over the list. */
+static uint32_t pick(const ego_set_t *set)
+{
+    const uint32_t n = (set->n < EGO_SUBSET) ? set->n : EGO_SUBSET;
+    const uint32_t stride_q16 = (set->n << 16) / n; /* n <= 65535 */
+    ego_subset_t *const s = set->subset;
+    uint32_t at_q16 = 0u;
+    for (uint32_t i = 0u; i < n; i++, at_q16 += stride_q16) {
+        const ego_vector_t p = set->vec[at_q16 >> 16];
+        s->x[i] = p.x;
+        s->y[i] = p.y;
+        s->u[i] = p.u;
+        s->v[i] = p.v;
+    }
+    return n;
+}
+
+/* How many vectors fit a direction and its opposite: the residual is below 0.35 of the median flow (the root of 1/8), the
+ * inverse depth positive. A plain count spares a division per vector and hypothesis; the accuracy in the end is that of a
+ * smooth kernel, and where an object moves by itself a narrow count is better. */
+static void score(const ego_subset_t *s, uint32_t n, ego_dir_t dir, uint32_t points[2])
 {
     uint32_t all = 0u;
     uint32_t forward = 0u;
-    uint32_t at_q16 = 0u;
-    for (uint32_t i = 0u; i < n; i++, at_q16 += stride_q16) {
-        const ego_view_t w = ego_view(&set->vec[at_q16 >> 16], dir);
-        const uint32_t c = evs_abs_u32(w.c) >> 13;
-        const uint32_t c2 = c * c;
-        const uint32_t k = w.a2 >> 6; /* (median |a|)^2 in the unit of c2 */
-        const uint32_t got = (uint32_t)(c2 < k) + (uint32_t)(c2 < (k >> 2)) + (uint32_t)(c2 < (k >> 4));
-        all += got;
-        if (w.d > 0) { forward += got; }
+    for (uint32_t i = 0u; i < n; i++) {
+        const int32_t ax = (s->x[i] * dir.z - dir.x) >> 16;
+        const int32_t ay = (s->y[i] * dir.z - dir.y) >> 16;
+        const int32_t c = (s->u[i] * ay - s->v[i] * ax) >> 12;
+        const int32_t d = s->u[i] * ax + s->v[i] * ay;
+        const int32_t a2 = ax * ax + ay * ay;
+        const uint32_t fits =
+            ((uint32_t)c * (uint32_t)c <= (uint32_t)a2 >> 7) ? 1u : 0u; /* r^2 <= 2^20 / 8, over 2^24 */
+        all += fits;
+        forward += (d > 0) ? fits : 0u;
     }
     points[0] = forward;
     points[1] = all - forward;
@@ -45,14 +63,13 @@ static void score(const ego_set_t *set, uint32_t stride_q16, uint32_t n, ego_dir
 
 evs_vec3_t ego_search(const ego_set_t *set)
 {
-    const uint32_t n = (set->n < EGO_SUBSET) ? set->n : EGO_SUBSET;
-    const uint32_t stride_q16 = (set->n << 16) / n; /* n <= 65535 */
+    const uint32_t n = pick(set);
     uint32_t most = 0u;
     evs_vec3_t best = {0, 0, EVS_ONE_Q30};
     for (int h = 0; h < N_HYPOTHESES; h++) {
         const evs_vec3_t v = {HEMISPHERE[h][0] * 65536, HEMISPHERE[h][1] * 65536, HEMISPHERE[h][2] * 65536};
         uint32_t points[2];
-        score(set, stride_q16, n, ego_dir(set, v), points);
+        score(set->subset, n, ego_dir(set, v), points);
         if (points[0] > most) {
             most = points[0];
             best = v;

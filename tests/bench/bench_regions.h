@@ -62,4 +62,9 @@ enum {
     BENCH_IMAGE_PAIR = 2,
 };
 
+/* bench_egomotion.c */
+enum { BENCH_SOLVES = 8 };
+
+enum { BENCH_SOLVE_500 = 0, BENCH_SOLVE_500_ROTATION = 1, BENCH_SOLVE_100 = 2, BENCH_SOLVE_500_PLANE = 3 };
+
 #endif

@@ -9,7 +9,7 @@
 enum { N_MAX = 500 };
 
 static evs_egomotion_flow_t flow[N_MAX];
-static uint32_t scratch[EVS_EGOMOTION_BYTES(N_MAX) / 4u + 1u];
+static uint32_t scratch[EVS_EGOMOTION_PAPER_BYTES(N_MAX) / 4u + 1u];
 static evs_egomotion_result_t result;
 static evs_egomotion_config_t cfg;
 
@@ -18,16 +18,17 @@ void setUp(void)
     cfg = evs_egomotion_config_default();
     scene_seed = 7u;
     memset(&result, 0x5A, sizeof result);
-    scratch[EVS_EGOMOTION_BYTES(N_MAX) / 4u] = 0xA5A5A5A5u;
+    memset(scratch, 0xA5, sizeof scratch);
 }
-void tearDown(void)
-{
-    TEST_ASSERT_EQUAL_HEX32_MESSAGE(0xA5A5A5A5u, scratch[EVS_EGOMOTION_BYTES(N_MAX) / 4u], "wrote past the scratch");
-}
+void tearDown(void) {}
 
 static void solve(size_t n)
 {
-    TEST_ASSERT_EQUAL_INT(EVS_OK, evs_egomotion_solve(&cfg, flow, n, scratch, EVS_EGOMOTION_BYTES(n), &result));
+    const bool robust = cfg.method == EVS_EGOMOTION_ROBUST;
+    const size_t bytes = robust ? EVS_EGOMOTION_BYTES(n) : EVS_EGOMOTION_PAPER_BYTES(n);
+    memset((unsigned char *)scratch + bytes, 0xA5, 4u);
+    TEST_ASSERT_EQUAL_INT(EVS_OK, evs_egomotion_solve(&cfg, flow, n, scratch, bytes, &result));
+    TEST_ASSERT_EACH_EQUAL_HEX8_MESSAGE(0xA5, (unsigned char *)scratch + bytes, 4u, "wrote past the scratch");
 }
 
 static scene_truth_t random_truth(void)
@@ -155,6 +156,248 @@ static void test_random_directions_are_chance(void)
     }
 }
 
+/* An answer, and not a confident wrong one. */
+static void assert_honest(const double v[3], int *n_valid)
+{
+    if ((result.flags & (uint32_t)EVS_EGOMOTION_VALID) == 0u) {
+        TEST_ASSERT_INT32_WITHIN(2, 843314857, result.sigma_rad_q28);
+        return;
+    }
+    TEST_ASSERT_EQUAL_HEX32(EVS_EGOMOTION_VALID, result.flags);
+    TEST_ASSERT_TRUE(scene_error_deg(&result, v) < 5.0 * scene_sigma_deg(&result) + 0.05);
+    *n_valid += 1;
+}
+
+static void test_five_vectors_are_few(void)
+{
+    for (int i = 0; i < 20; i++) {
+        const scene_settings_t s = scene_settings(0.2, 0.0);
+        const scene_truth_t truth = random_truth();
+        scene_make(&s, &truth, flow, 5);
+        solve(5);
+        assert_no_answer(EVS_EGOMOTION_FEW);
+    }
+}
+
+static void test_equal_flow_is_a_lateral_motion(void)
+{
+    /* what a plane at constant depth shows to a camera that moves to the left */
+    for (size_t i = 0; i < N_MAX; i++) {
+        flow[i] = scene_vector(scene_uniform() - 0.5, scene_uniform() - 0.5, 0.01, 0.0);
+    }
+    solve(N_MAX);
+    const double v[3] = {-1.0, 0.0, 0.0};
+    int n_valid = 0;
+    assert_honest(v, &n_valid);
+    TEST_ASSERT_EQUAL_INT(1, n_valid);
+    TEST_ASSERT_TRUE(scene_error_deg(&result, v) < 0.1);
+}
+
+static void test_pure_rotation_is_flagged(void)
+{
+    for (int i = 0; i < 30; i++) {
+        scene_settings_t s = scene_settings((i % 3 == 0) ? 0.0 : 0.3 * (double)(i % 3), 0.1 * (double)(i % 4));
+        scene_truth_t truth = {{0, 0, 1}, {0, 0, 0}};
+        s.way_m = 0.0;
+        scene_direction(truth.w);
+        for (int k = 0; k < 3; k++) { truth.w[k] *= 0.0175; } /* 1 degree */
+        scene_make(&s, &truth, flow, N_MAX);
+        solve(N_MAX);
+        TEST_ASSERT_EQUAL_HEX32(0u, result.flags & (uint32_t)EVS_EGOMOTION_VALID);
+        TEST_ASSERT_TRUE((result.flags & (uint32_t)(EVS_EGOMOTION_ROTATION | EVS_EGOMOTION_CHANCE)) != 0u);
+    }
+}
+
+static void test_planes(void)
+{
+    int n_valid = 0;
+    for (int i = 0; i < 20; i++) {
+        scene_settings_t s = scene_settings(0.3, 0.1);
+        const scene_truth_t truth = random_truth();
+        s.depth_low_m = s.depth_high_m = 2.5;
+        scene_make(&s, &truth, flow, N_MAX);
+        solve(N_MAX);
+        assert_honest(truth.v, &n_valid);
+    }
+    TEST_ASSERT_TRUE(n_valid >= 19);
+}
+
+static void test_an_object_that_moves_by_itself(void)
+{
+    int n_valid = 0;
+    for (int i = 0; i < 20; i++) {
+        scene_settings_t s = scene_settings(0.2, 0.05);
+        const scene_truth_t truth = random_truth();
+        s.object_share = 0.3;
+        scene_make(&s, &truth, flow, N_MAX);
+        solve(N_MAX);
+        assert_honest(truth.v, &n_valid);
+    }
+    TEST_ASSERT_TRUE(n_valid >= 17);
+}
+
+static void test_points_behind_give_the_other_sign(void)
+{
+    /* A scene behind the camera, seen through negative depths: V cannot be told from -V seen in front. */
+    const scene_settings_t s = scene_settings(0.0, 0.0);
+    const scene_truth_t truth = random_truth();
+    scene_make(&s, &truth, flow, 400);
+    for (size_t i = 0; i < 200; i++) { /* half of them: then no sign is right */
+        flow[i].u_q24 = -flow[i].u_q24;
+        flow[i].v_q24 = -flow[i].v_q24;
+    }
+    solve(400);
+    assert_no_answer(EVS_EGOMOTION_SIGN_UNSURE);
+}
+
+static void test_positions_out_of_range_are_counted(void)
+{
+    const scene_settings_t s = scene_settings(0.0, 0.0);
+    const scene_truth_t truth = random_truth();
+    scene_make(&s, &truth, flow, 200);
+    flow[3].x_q24 = INT32_C(8) << 24;
+    flow[50].y_q24 = INT32_MIN;
+    solve(200);
+    TEST_ASSERT_EQUAL_UINT32(2u, result.n_rejected);
+    TEST_ASSERT_EQUAL_UINT32(198u, result.n_flow);
+    TEST_ASSERT_TRUE(scene_error_deg(&result, truth.v) < 0.05);
+}
+
+static void test_wide_views(void)
+{
+    static const double REACH[] = {1.9, 3.5, 7.5};
+    for (size_t k = 0; k < 3u; k++) {
+        const scene_truth_t truth = random_truth();
+        for (size_t i = 0; i < N_MAX; i++) {
+            const double x = REACH[k] * (2.0 * scene_uniform() - 1.0);
+            const double y = REACH[k] * (2.0 * scene_uniform() - 1.0);
+            double uv[2];
+            scene_flow(x, y, 20.0 + 80.0 * scene_uniform(), truth.v, truth.w, uv);
+            flow[i] = scene_vector(x, y, uv[0], uv[1]);
+        }
+        solve(N_MAX);
+        TEST_ASSERT_EQUAL_HEX32(EVS_EGOMOTION_VALID, result.flags);
+        TEST_ASSERT_EQUAL_UINT32(0u, result.n_rejected);
+        TEST_ASSERT_TRUE(scene_error_deg(&result, truth.v) < 0.1);
+    }
+}
+
+static void test_any_scale_of_flow(void)
+{
+    const scene_settings_t s = scene_settings(0.2, 0.1);
+    const scene_truth_t truth = random_truth();
+    scene_make(&s, &truth, flow, N_MAX);
+    solve(N_MAX);
+    const evs_egomotion_result_t once = result;
+    for (size_t i = 0; i < N_MAX; i++) { /* the same flow over an interval 16 times as long */
+        flow[i].u_q24 *= 16;
+        flow[i].v_q24 *= 16;
+    }
+    solve(N_MAX);
+    TEST_ASSERT_INT32_WITHIN(200000, once.v_q30.x, result.v_q30.x); /* 0.01 degree */
+    TEST_ASSERT_INT32_WITHIN(200000, once.v_q30.y, result.v_q30.y);
+    TEST_ASSERT_INT32_WITHIN(200000, once.v_q30.z, result.v_q30.z);
+    TEST_ASSERT_UINT32_WITHIN(16u, 16u * once.median_flow_q24, result.median_flow_q24);
+    TEST_ASSERT_UINT32_WITHIN(result.noise_q24 / 20u, 16u * once.noise_q24, result.noise_q24);
+}
+
+static void test_noise_and_median_in_units(void)
+{
+    const scene_settings_t s = scene_settings(0.5, 0.0);
+    const scene_truth_t truth = {{1, 0, 0}, {0, 0, 0}};
+    scene_make(&s, &truth, flow, N_MAX);
+    solve(N_MAX);
+    const double px = 16777216.0 / SCENE_F;
+    TEST_ASSERT_TRUE(fabs((double)result.noise_q24 / px - 0.5) < 0.1);
+    TEST_ASSERT_TRUE(fabs((double)result.median_flow_q24 / px - 9.95 / 3.0) < 0.3); /* 199 * 0.05 / 3 m */
+}
+
+static void test_variance_factor_scales_sigma(void)
+{
+    const scene_settings_t s = scene_settings(0.5, 0.1);
+    const scene_truth_t truth = random_truth();
+    scene_make(&s, &truth, flow, N_MAX);
+    solve(N_MAX);
+    const double before = scene_sigma_deg(&result);
+    const int32_t xx = result.covariance_rad2_q30[0];
+    cfg.variance_factor_q8 = 4u * 256u;
+    solve(N_MAX);
+    TEST_ASSERT_TRUE(fabs(scene_sigma_deg(&result) / before - 2.0) < 0.001);
+    TEST_ASSERT_INT32_WITHIN(8, 4 * xx, result.covariance_rad2_q30[0]);
+}
+
+static void test_covariance_is_of_the_camera_axes(void)
+{
+    const scene_settings_t s = scene_settings(0.5, 0.1);
+    const scene_truth_t truth = random_truth();
+    scene_make(&s, &truth, flow, N_MAX);
+    solve(N_MAX);
+    const int32_t *const c = result.covariance_rad2_q30;
+    const double sigma = evs_q_to_double(result.sigma_rad_q28, 28);
+    const double trace = ((double)c[0] + (double)c[3] + (double)c[5]) / 1073741824.0;
+    TEST_ASSERT_TRUE(fabs(trace / (sigma * sigma) - 1.0) < 0.01);
+    const double v[3] = {result.v_q30.x / 1073741824.0, result.v_q30.y / 1073741824.0, result.v_q30.z / 1073741824.0};
+    const double along[3] = {c[0] * v[0] + c[1] * v[1] + c[2] * v[2], c[1] * v[0] + c[3] * v[1] + c[4] * v[2],
+                             c[2] * v[0] + c[4] * v[1] + c[5] * v[2]};
+    for (int k = 0; k < 3; k++) { TEST_ASSERT_TRUE(fabs(along[k]) < 4.0); } /* no spread along v */
+}
+
+static void test_rotation_prior(void)
+{
+    double plain = 0.0;
+    double with_prior = 0.0;
+    for (int i = 0; i < 10; i++) {
+        const scene_settings_t s = scene_settings(0.3, 0.1);
+        scene_truth_t truth = random_truth();
+        scene_direction(truth.w);
+        for (int k = 0; k < 3; k++) { truth.w[k] *= 0.00175; } /* 2 deg/s over 50 ms */
+        scene_make(&s, &truth, flow, N_MAX);
+        cfg.rotation_sigma_rad_q28 = 0;
+        solve(N_MAX);
+        TEST_ASSERT_EQUAL_INT32(0, result.rotation_rad_q28.x);
+        plain += scene_error_deg(&result, truth.v);
+        cfg.rotation_sigma_rad_q28 = evs_q_from_double(0.00175, 28);
+        solve(N_MAX);
+        TEST_ASSERT_EQUAL_HEX32(EVS_EGOMOTION_VALID, result.flags);
+        const double error = scene_error_deg(&result, truth.v);
+        with_prior += error;
+        TEST_ASSERT_TRUE(error < 4.0 * scene_sigma_deg(&result));
+        TEST_ASSERT_TRUE(fabs(evs_q_to_double(result.rotation_rad_q28.x, 28) - truth.w[0]) < 0.0015);
+        TEST_ASSERT_TRUE(fabs(evs_q_to_double(result.rotation_rad_q28.y, 28) - truth.w[1]) < 0.0015);
+        TEST_ASSERT_TRUE(fabs(evs_q_to_double(result.rotation_rad_q28.z, 28) - truth.w[2]) < 0.0015);
+        uint32_t n = 0u;
+        for (size_t k = 0; k < N_MAX; k++) { n += evs_egomotion_is_inlier(&result, &flow[k]) ? 1u : 0u; }
+        TEST_ASSERT_EQUAL_UINT32(result.n_inliers, n);
+    }
+    TEST_ASSERT_TRUE(with_prior < 0.6 * plain);
+}
+
+static void test_published_estimators(void)
+{
+    enum { N = 60 };
+    const scene_settings_t s = scene_settings(0.05, 0.1);
+    scene_truth_t truth = random_truth();
+    scene_make(&s, &truth, flow, N);
+    cfg.method = EVS_EGOMOTION_PAPER;
+    solve(N);
+    TEST_ASSERT_EQUAL_HEX32(EVS_EGOMOTION_VALID, result.flags);
+    TEST_ASSERT_TRUE(scene_error_deg(&result, truth.v) < 3.0);
+    TEST_ASSERT_EQUAL_INT32(0, result.rotation_rad_q28.y);
+
+    truth.w[0] = 0.01;
+    truth.w[1] = -0.02;
+    truth.w[2] = 0.015;
+    scene_make(&s, &truth, flow, N);
+    cfg.method = EVS_EGOMOTION_ERL;
+    solve(N);
+    TEST_ASSERT_EQUAL_HEX32(EVS_EGOMOTION_VALID, result.flags);
+    TEST_ASSERT_TRUE(scene_error_deg(&result, truth.v) < 5.0);
+    TEST_ASSERT_TRUE(fabs(evs_q_to_double(result.rotation_rad_q28.x, 28) - truth.w[0]) < 0.002);
+    TEST_ASSERT_TRUE(fabs(evs_q_to_double(result.rotation_rad_q28.y, 28) - truth.w[1]) < 0.002);
+    TEST_ASSERT_TRUE(fabs(evs_q_to_double(result.rotation_rad_q28.z, 28) - truth.w[2]) < 0.002);
+    TEST_ASSERT_EQUAL_INT(EVS_ERR_SIZE, try_config(cfg, N, EVS_EGOMOTION_PAPER_BYTES(N) - 1u));
+}
+
 static void test_extreme_numbers(void)
 {
     static const int32_t EXTREME[] = {INT32_MIN,
@@ -191,6 +434,20 @@ int main(void)
     RUN_TEST(test_inliers_are_those_counted);
     RUN_TEST(test_no_vector_and_no_motion);
     RUN_TEST(test_random_directions_are_chance);
+    RUN_TEST(test_five_vectors_are_few);
+    RUN_TEST(test_equal_flow_is_a_lateral_motion);
+    RUN_TEST(test_pure_rotation_is_flagged);
+    RUN_TEST(test_planes);
+    RUN_TEST(test_an_object_that_moves_by_itself);
+    RUN_TEST(test_points_behind_give_the_other_sign);
+    RUN_TEST(test_positions_out_of_range_are_counted);
+    RUN_TEST(test_wide_views);
+    RUN_TEST(test_any_scale_of_flow);
+    RUN_TEST(test_noise_and_median_in_units);
+    RUN_TEST(test_variance_factor_scales_sigma);
+    RUN_TEST(test_covariance_is_of_the_camera_axes);
+    RUN_TEST(test_rotation_prior);
+    RUN_TEST(test_published_estimators);
     RUN_TEST(test_extreme_numbers);
     return UNITY_END();
 }
