@@ -66,6 +66,12 @@ PER_IMAGE = [  # (row, region, how many there are in it)
     ("flow: a corner tracked, 31 px, every 2nd, 2 levels, there and back", "TRACK_ALL", "TRACKS"),
     ("**image pair: corners, half, 128 tracks**", "IMAGE_PAIR", "ONE"),
 ]
+PER_SOLVE = [
+    ("**direction of velocity from 500 vectors**", "SOLVE_500"),
+    ("the same from 100", "SOLVE_100"),
+    ("from 500, on a plane, so that a rotation has to be ruled out", "SOLVE_500_PLANE"),
+    ("from 500, with a prior on the residual rotation", "SOLVE_500_ROTATION"),
+]
 
 
 def constants():
@@ -81,7 +87,7 @@ def table(head, rows):
 
 def generate(trees, plugin):
     number = constants()
-    counts, attitude, images, flow = {}, {}, {}, {}
+    counts, attitude, images, flow, solve = {}, {}, {}, {}, {}
     for tree in trees:
         image = os.path.join(tree.path, "tests", "bench", "bench_events")
         counts[tree.name], _ = count(plugin, RUN_QEMU, TARGETS[tree.name][1], image)
@@ -91,6 +97,8 @@ def generate(trees, plugin):
         images[tree.name], _ = count(plugin, RUN_QEMU, TARGETS[tree.name][1], image)
         image = os.path.join(tree.path, "tests", "bench", "bench_flow")
         flow[tree.name], _ = count(plugin, RUN_QEMU, TARGETS[tree.name][1], image)
+        image = os.path.join(tree.path, "tests", "bench", "bench_egomotion")
+        solve[tree.name], _ = count(plugin, RUN_QEMU, TARGETS[tree.name][1], image)
 
     def per_call(name, tree, counts=counts, expected=number["BATCHES"]):
         calls, insns = counts[tree.name][number[name]]
@@ -114,6 +122,7 @@ def generate(trees, plugin):
              for row, region in PER_UPDATE]
     number["ONE"] = 1
     rows += [[row] + [f"{per_call(region, t, flow, 1) / number[n]:.0f}" for t in trees] for row, region, n in PER_IMAGE]
+    rows += [[row] + [f"{per_call(region, t, solve, number['SOLVES']):.0f}" for t in trees] for row, region in PER_SOLVE]
     return out + "\nInstructions per call:\n\n" + table(["step"] + names, rows)
 
 
