@@ -43,6 +43,7 @@ set(EVS_SOURCES
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_types.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_undistort.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_undistort_mve.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_undistort_sse2.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_vec.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_velocity.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_warp.c

@@ -179,10 +179,14 @@ void evs_homography_map(const evs_homography_t *h, const evs_point_t *in, size_t
         for (size_t i = 0u; i < n; i++) { out[i] = evs_homography_map_exact(h, in[i]); }
         return;
     }
-    size_t done = 0u;
 #if EVS_SIMD_X86
-    if (__builtin_cpu_supports("avx2")) { done = evs_homography_map_avx2(h, in, n, out); }
-#elif EVS_SIMD_MVE
+    if (__builtin_cpu_supports("avx2")) {
+        evs_homography_map_avx2(h, in, n, out);
+        return;
+    }
+#endif
+    size_t done = 0u;
+#if EVS_SIMD_MVE
     done = evs_homography_map_mve(h, in, n, out);
 #elif EVS_SIMD_DSP
     done = evs_homography_map_dsp(h, in, n, out);

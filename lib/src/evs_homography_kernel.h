@@ -17,10 +17,11 @@ void evs_homography_map_plain(const evs_homography_t *h, const evs_point_t *in, 
 /* The map by exact division, for points that the fast path refuses. */
 evs_point_t evs_homography_map_exact(const evs_homography_t *h, evs_point_t p);
 
-/* map_fast() of eight points at a time; returns how many it mapped. Only where the processor has AVX2. */
-size_t evs_homography_map_avx2(const evs_homography_t *h, const evs_point_t *in, size_t n, evs_point_t *out);
+/* map_fast() of eight points at a time. Only where the processor has AVX2. */
+void evs_homography_map_avx2(const evs_homography_t *h, const evs_point_t *in, size_t n, evs_point_t *out);
 
-/* The same for Arm's microcontrollers: points by two or by four. They may leave any number of points at the end. */
+/* The same for Arm's microcontrollers: points by two or by four. They return how many they mapped, and may leave any
+ * number of points at the end. */
 size_t evs_homography_map_dsp(const evs_homography_t *h, const evs_point_t *in, size_t n, evs_point_t *out);
 size_t evs_homography_map_mve(const evs_homography_t *h, const evs_point_t *in, size_t n, evs_point_t *out);
 

@@ -509,7 +509,9 @@ static size_t map_by_eight(evs_undistort_t *u, const evs_event_t *ev, size_t n, 
 static void map_exact(evs_undistort_t *u, const evs_event_t *ev, size_t n, evs_point_t *points, uint16_t *tiles)
 {
     size_t done = 0u;
-#if EVS_SIMD_MVE
+#if EVS_SIMD_X86
+    done = evs_undistort_map_sse2(u, ev, n, points, tiles);
+#elif EVS_SIMD_MVE
     done = evs_undistort_map_mve(u, ev, n, points, tiles);
 #elif EVS_SIMD_DSP
     done = map_by_eight(u, ev, n, points, tiles);

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT
  * SPDX-FileCopyrightText: 2026 the evstab authors */
 /*
- * Every variant of a hot loop (DSP, Helium, AVX2, unrolled) gives the bits of the plain C, at every length and
- * alignment, and writes nothing else. This file is compiled with EVS_NO_SIMD=1, so that the kernel it includes is the
- * plain one.
+ * Every variant of a hot loop (DSP, Helium, SSE2, AVX2, unrolled, without branches) gives the bits of the plain C, at
+ * every length and alignment, and writes nothing else. This file is compiled with EVS_NO_SIMD=1, so that the kernel it
+ * includes is the plain one.
  */
 #include "../../lib/src/evs_homography_kernel.h"
 #include "evs/undistort.h"
@@ -280,8 +280,19 @@ static void test_look_up_at_every_length_and_alignment(void)
 
 /* --- window ------------------------------------------------------------------------------------------------------ */
 
-static uint16_t counts[N_TILES];
-static uint16_t counts_wanted[N_TILES];
+enum { N_COUNTS = EVS_TILES_MAX };
+
+static uint16_t counts[N_COUNTS + 1];
+static uint16_t counts_wanted[N_COUNTS];
+
+static void open_window(evs_window_t *win, uint32_t threshold, size_t n_tiles)
+{
+    evs_window_config_t cfg = evs_window_config_default();
+    cfg.threshold = threshold;
+    TEST_ASSERT_EQUAL_INT(EVS_OK, evs_window_init(win, &cfg, counts, n_tiles));
+    memset(counts_wanted, 0, sizeof counts_wanted);
+    counts[n_tiles] = 0x5A5Au;
+}
 
 /* How many of n events a window takes that closes with the one above the threshold; counts as it does. */
 static size_t plain_count(const uint16_t *tiles, size_t n, uint32_t threshold, bool *closes)
@@ -297,28 +308,77 @@ static size_t plain_count(const uint16_t *tiles, size_t n, uint32_t threshold, b
     return n;
 }
 
+/* Push n tiles of tile_store; true when the window closed. */
+static bool count_and_check(evs_window_t *win, size_t n, uint32_t threshold, size_t n_tiles)
+{
+    evs_window_end_t end;
+    bool closes;
+    const size_t want = plain_count(tile_store, n, threshold, &closes);
+    TEST_ASSERT_EQUAL_UINT(want, evs_window_push(win, events, tile_store, n, &end));
+    TEST_ASSERT_EQUAL_INT(closes ? EVS_WINDOW_BY_AREA : EVS_WINDOW_OPEN, end.reason);
+    if (closes) { memset(counts_wanted, 0, n_tiles * sizeof counts[0]); }
+    TEST_ASSERT_EQUAL_MEMORY(counts_wanted, counts, n_tiles * sizeof counts[0]);
+    TEST_ASSERT_EQUAL_HEX16_MESSAGE(0x5A5A, counts[n_tiles], "wrote behind the counts");
+    return closes;
+}
+
+/* From no event with a tile to every one, and from one tile on. */
 static void test_area_count_at_every_length(void)
 {
-    evs_window_config_t cfg = evs_window_config_default();
-    for (int round = 0; round < 100; round++) {
-        cfg.threshold = 1u + below(20u);
+    memset(events, 0, sizeof events);
+    for (int round = 0; round < 400; round++) {
+        const uint32_t threshold = 1u + below(20u);
+        const size_t n_tiles = ((round % 2) == 0) ? N_TILES : 1u + below(6u);
+        const uint32_t with_tile = below(9u); /* of 8 */
         evs_window_t win;
-        TEST_ASSERT_EQUAL_INT(EVS_OK, evs_window_init(&win, &cfg, counts, N_TILES));
-        memset(counts_wanted, 0, sizeof counts_wanted);
+        open_window(&win, threshold, n_tiles);
         for (size_t n = 0u; n <= N_MAX; n++) {
             for (size_t i = 0u; i < n; i++) {
-                tile_store[i] = (below(8u) == 0u) ? EVS_TILE_NONE : (uint16_t)below(N_TILES);
-                events[i].t_us = 0u;
+                tile_store[i] = (below(8u) < with_tile) ? (uint16_t)below((uint32_t)n_tiles) : (uint16_t)EVS_TILE_NONE;
             }
-            evs_window_end_t end;
-            bool closes;
-            const size_t want = plain_count(tile_store, n, cfg.threshold, &closes);
-            TEST_ASSERT_EQUAL_UINT(want, evs_window_push(&win, events, tile_store, n, &end));
-            TEST_ASSERT_EQUAL_INT(closes ? EVS_WINDOW_BY_AREA : EVS_WINDOW_OPEN, end.reason);
-            if (closes) { memset(counts_wanted, 0, sizeof counts_wanted); }
-            TEST_ASSERT_EQUAL_MEMORY(counts_wanted, counts, sizeof counts);
+            (void)count_and_check(&win, n, threshold, n_tiles);
         }
     }
+}
+
+/* Every tile of the first few is as full as it may be: an event without a tile must not close the window, nor the next
+ * event of another tile; one more of a full tile must, wherever it comes in a batch. */
+static void test_a_full_tile_closes_the_window_with_its_own_next_event_only(void)
+{
+    memset(events, 0, sizeof events);
+    for (size_t n_tiles = 1u; n_tiles <= 9u; n_tiles++) {
+        for (uint32_t threshold = 1u; threshold <= 3u; threshold++) {
+            for (size_t closing = 0u; closing < 13u; closing++) {
+                evs_window_t win;
+                open_window(&win, threshold, n_tiles);
+                for (uint32_t k = 0u; k < threshold; k++) {
+                    for (size_t i = 0u; i < n_tiles; i++) { tile_store[i] = (uint16_t)i; }
+                    TEST_ASSERT_FALSE(count_and_check(&win, n_tiles, threshold, n_tiles));
+                }
+                for (size_t i = 0u; i < 13u; i++) { tile_store[i] = EVS_TILE_NONE; }
+                TEST_ASSERT_FALSE(count_and_check(&win, 13u, threshold, n_tiles));
+                tile_store[closing] = (uint16_t)below((uint32_t)n_tiles);
+                TEST_ASSERT_TRUE(count_and_check(&win, 13u, threshold, n_tiles));
+            }
+        }
+    }
+}
+
+/* The last index of the largest grid lies next to EVS_TILE_NONE, the highest threshold next to where a count wraps. */
+static void test_the_largest_grid_and_the_highest_threshold(void)
+{
+    memset(events, 0, sizeof events);
+    evs_window_t win;
+    open_window(&win, EVS_WINDOW_AREA_MAX, EVS_TILES_MAX);
+    for (size_t i = 0u; i < N_LONG; i++) { tile_store[i] = ((i % 3u) == 0u) ? EVS_TILE_NONE : EVS_TILES_MAX - 1u; }
+    const uint32_t per_push = N_LONG / 3u * 2u;
+    for (uint32_t n_counted = 0u; n_counted + per_push <= EVS_WINDOW_AREA_MAX; n_counted += per_push) {
+        evs_window_end_t end;
+        TEST_ASSERT_EQUAL_UINT(N_LONG, evs_window_push(&win, events, tile_store, N_LONG, &end));
+    }
+    TEST_ASSERT_EQUAL_UINT32(EVS_WINDOW_AREA_MAX / per_push * per_push, counts[EVS_TILES_MAX - 1u]);
+    counts_wanted[EVS_TILES_MAX - 1u] = counts[EVS_TILES_MAX - 1u];
+    TEST_ASSERT_TRUE(count_and_check(&win, N_LONG, EVS_WINDOW_AREA_MAX, EVS_TILES_MAX));
 }
 
 int main(void)
@@ -331,5 +391,7 @@ int main(void)
     RUN_TEST(test_the_last_position_in_range_is_one_and_the_next_is_none);
     RUN_TEST(test_look_up_at_every_length_and_alignment);
     RUN_TEST(test_area_count_at_every_length);
+    RUN_TEST(test_a_full_tile_closes_the_window_with_its_own_next_event_only);
+    RUN_TEST(test_the_largest_grid_and_the_highest_threshold);
     return UNITY_END();
 }
