@@ -15,6 +15,7 @@
 int evt_attitude_main(int argc, char **argv);
 int evt_bench_main(int argc, char **argv);
 int evt_demo_main(int argc, char **argv);
+int evt_egomotion_main(int argc, char **argv);
 int evt_eval_main(int argc, char **argv);
 int evt_info_main(int argc, char **argv);
 int evt_lut_main(int argc, char **argv);

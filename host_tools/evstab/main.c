@@ -14,6 +14,7 @@ static const struct {
     {"demo", "a simulated flight, stabilized, as a page to look at", evt_demo_main},
     {"replay", "a recording through the library: stabilized events, windows, attitude", evt_replay_main},
     {"attitude", "the attitude filter alone, on the samples of an IMU", evt_attitude_main},
+    {"egomotion", "the direction of velocity alone, from flow vectors", evt_egomotion_main},
     {"eval", "what a run found against the truth: attitude, velocity, sharpness", evt_eval_main},
     {"lut", "the undistortion table of a camera as a C header for flash", evt_lut_main},
     {"info", "what a file or a folder holds, and what is wrong with it", evt_info_main},

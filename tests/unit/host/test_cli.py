@@ -96,13 +96,13 @@ def recording(name, **files):
 
 def test_usage():
     expect("no command", [], 2, "Usage: evstab")
-    expect("help", ["--help"], 0, ">replay", ">attitude", ">lut", ">info", ">sim", n_lines=0)
+    expect("help", ["--help"], 0, ">replay", ">attitude", ">egomotion", ">lut", ">info", ">sim", n_lines=0)
     expect("version", ["--version"], 0, r">^evstab \d+\.\d+\.\d+$", n_lines=0)
     expect("unknown command", ["frobnicate"], 2, "unknown command 'frobnicate'", n_lines=1)
-    for later in ("egomotion", "convert", "view", "live"):
+    for later in ("convert", "view", "live"):
         expect("a command that is not there yet", [later], 2, f"unknown command '{later}'", n_lines=1)
         check("help lists only what exists", f"  {later} " not in run("--help").stdout, later)
-    for command in ("replay", "attitude", "lut", "info", "sim"):
+    for command in ("replay", "attitude", "egomotion", "lut", "info", "sim"):
         expect(f"{command} --help", [command, "--help"], 0, f">Usage: evstab {command}", ">Exit status", n_lines=0)
         expect(f"{command} without input", [command], 2, f"evstab {command}: ", f"evstab {command} --help", n_lines=1)
         expect(f"{command} --what", [command, "x", "--what"], 2, "unknown option '--what'", n_lines=1)
@@ -543,6 +543,107 @@ def test_attitude():
         expect("disk full", ["attitude", "imu.csv", "-o", "/dev/full"], 1, "No space left", n_lines=1)
 
 
+def flow_of(v, seed, n=120, frame=None):
+    """Exact flow of random points under a motion along v, with the numbers of a simple generator."""
+    state, rows = seed, []
+    def uniform():
+        nonlocal state
+        state = (state * 1103515245 + 12345) % 2**31
+        return state / 2**31
+    for _ in range(n):
+        x, y, rho = uniform() - 0.5, 0.8 * uniform() - 0.4, 0.01 + 0.04 * uniform()
+        uv = rho * (x * v[2] - v[0]), rho * (y * v[2] - v[1])
+        rows.append(("" if frame is None else f"{frame},") + f"{x:.7f},{y:.7f},{uv[0]:.9f},{uv[1]:.9f}")
+    return rows
+
+
+def angle_deg(a, b):
+    return math.degrees(math.acos(max(-1.0, min(1.0, sum(p * q for p, q in zip(a, b))))))
+
+
+def directions(text):
+    table = list(csv.reader(text.splitlines()))
+    check("header of directions", table[0] == ["frame", "vx", "vy", "vz", "sigma_deg", "n_inliers"], table[0])
+    return {int(row[0]): ([float(c) for c in row[1:4]], float(row[4]), int(row[5])) for row in table[1:]}
+
+
+def test_egomotion():
+    truth = {3: (0.6, 0.0, 0.8), 4: (-1.0, 0.0, 0.0), 9: (0.0, 0.6, -0.8), -2: (0.48, -0.6, 0.64)}
+    lines = ["frame,x,y,u,v"] + [row for frame, v in truth.items() for row in flow_of(v, 7 + frame, frame=frame)]
+    write("flow.csv", "\n".join(lines) + "\n")
+    done = expect("four frames", ["egomotion", "flow.csv"], 0, n_lines=0)
+    found = directions(done.stdout)
+    check("one line per frame, in their order", list(found) == list(truth), list(found))
+    for frame, v in truth.items():
+        got, sigma, n = found[frame]
+        check("direction and sign", angle_deg(got, v) < 0.1, (frame, got, v))
+        check("unit", abs(sum(c * c for c in got) - 1) < 1e-8, got)
+        check("sigma", sigma < 0.1, sigma)
+        check("inliers", n == 120, n)
+    for method, limit in (("erlv", 0.1), ("erlv-paper", 0.5), ("erl", 1.0)):
+        other = directions(expect(method, ["egomotion", "flow.csv", "--method", method], 0, n_lines=0).stdout)
+        check(f"{method} finds them", all(angle_deg(other[f][0], v) < limit for f, v in truth.items()), other)
+    expect("wrong method", ["egomotion", "flow.csv", "--method", "ransac"], 2, "expected erlv, erlv-paper or erl", n_lines=1)
+    for value in ("-1", "51", "x"):
+        expect("wrong sigma", ["egomotion", "flow.csv", "--rotation-sigma-deg", value], 2, "expected degrees from 0 to 50", n_lines=1)
+    expect("a prior is not theirs", ["egomotion", "flow.csv", "--method", "erl", "--rotation-sigma-deg", "1"], 2, "is for --method erlv", n_lines=1)
+
+    def same(case, name, content, *arguments):
+        again = expect(case, ["egomotion", write(name, content), *arguments], 0, n_lines=0)
+        check(case, again.stdout == done.stdout, again.stdout)
+    same("gzip", "flow.csv.gz", gzip.compress("\n".join(lines).encode()))
+    same("CR LF, no last line end", "flow_crlf.csv", "\r\n".join(lines))
+    same("blanks, comments, a commented header, capitals", "flow_blank.csv",
+         "# made by hand\n\n#Frame X Y U V\n# and\n" + "\n".join(line.replace(",", " ") for line in lines[1:]))
+    shuffled = ["q;v;frame;x;u;y;z"] + ["a;{4};{0};{1};{3};{2};0".format(*line.split(",")) for line in lines[1:]]
+    same("columns in another order, others beside them", "flow_order.csv", "\n".join(shuffled))
+    expect("to a file", ["egomotion", "flow.csv", "-o", "v.csv"], 0, ">v.csv: 4 frames, 0 of them", n_lines=0)
+    check("the same there", (ROOT / "v.csv").read_text() == done.stdout)
+    check("quiet", run("egomotion", "flow.csv", "-o", "v.csv", "-q").stdout == "")
+    expect("onto itself", ["egomotion", "flow.csv", "-o", "flow.csv"], 1, "would overwrite the input", n_lines=1)
+    expect("unwritable", ["egomotion", "flow.csv", "-o", "/nowhere/v.csv"], 1, "/nowhere/v.csv", n_lines=1)
+
+    tiny = ["x,y,u,v"] + [",".join(row.split(",")[:2] + [f"{float(c) * 1e-5:.12e}" for c in row.split(",")[2:]])
+                          for row in flow_of((0.6, 0.0, 0.8), 1)]
+    got = directions(expect("no frame column, tiny flow", ["egomotion", write("flow_tiny.csv", "\n".join(tiny))], 0, n_lines=0).stdout)
+    check("frame 0", list(got) == [0] and angle_deg(got[0][0], (0.6, 0.0, 0.8)) < 0.1 and got[0][1] < 1, got)
+
+    nothing = ["frame,x,y,u,v", "1,0.1,0.2,0,0", "1,0.2,0.3,0,0"] + flow_of((0.6, 0.0, 0.8), 1, frame=2) + flow_of((0.6, 0.0, 0.8), 1, 4, 5)
+    nothing += ["6,nan,0,0,0", "6,0,0,inf,0"]
+    bad = expect("frames that tell nothing", ["egomotion", write("flow_none.csv", "\n".join(nothing))], 0,
+                 "note: 3 of 4 frames tell no direction", r"skipped 2 lines of flow_none.csv: 2 .*\(first: line 128\)", n_lines=1)
+    got = directions(bad.stdout)
+    check("still a line each, sigma 180, a unit vector", list(got) == [1, 2, 5, 6] and all(got[f][1] == 180 for f in (1, 5, 6)) and
+          all(abs(sum(c * c for c in got[f][0]) - 1) < 1e-8 for f in got), got)
+    check("the good one is good", got[2][1] < 1 and angle_deg(got[2][0], (0.6, 0.0, 0.8)) < 0.1, got[2])
+
+    spoilt = list(lines)
+    spoilt[5] = "3,0.1,0.2,0.3"
+    spoilt[9] = "3,0.1,0.2,x,0.3"
+    spoilt[10] = "3.5,0.1,0.2,0.1,0.3"
+    spoilt[11] = ",0.1,0.2,0.1,0.3"
+    spoilt[20] = "3,8.0,0.2,0.1,0.3"
+    spoilt[21] = "3,0.1,0.2,1e9,0.3"
+    spoilt.insert(30, "3,0.1," + "9" * 70000)
+    expect("bad lines", ["egomotion", write("flow_bad.csv", "\n".join(spoilt))], 0, r"skipped 7 lines of flow_bad.csv: 5 malformed \(first: line 6\), 2 .*\(first: line 21\)",
+           n_lines=1)
+    again = lines + flow_of((0.6, 0.0, 0.8), 5, 1, 4)
+    expect("a frame that comes again", ["egomotion", write("flow_again.csv", "\n".join(again))], 1, r"line 482: frame 4 was there before", n_lines=1)
+    many = ["x,y,u,v"] + ["0.1,0.1,0.01,0.01"] * 65536
+    expect("too many", ["egomotion", write("flow_many.csv", "\n".join(many))], 1, "line 65537: more than 65535 vectors in frame 0", n_lines=1)
+    expect("no such file", ["egomotion", "nowhere.csv"], 1, "nowhere.csv", "No such file", n_lines=1)
+    expect("empty", ["egomotion", write("flow_empty.csv", "")], 1, "the file is empty", n_lines=1)
+    expect("no header", ["egomotion", write("flow_nohead.csv", "\n".join(lines[1:]))], 1, "line 1: no header with the columns x, y, u, v", n_lines=1)
+    expect("a column is missing", ["egomotion", write("flow_xyu.csv", "frame,x,y,u\n0,0,0,0\n")], 1, "line 1: no header", n_lines=1)
+    expect("header only", ["egomotion", write("flow_head.csv", lines[0])], 1, "holds no flow vector", n_lines=1)
+    expect("garbage", ["egomotion", write("flow_png.csv", bytes(range(256)) * 300)], 1, "no header", n_lines=1)
+    cut = gzip.compress("\n".join(lines).encode())[:-300]
+    done = expect("truncated gzip", ["egomotion", write("flow_cut.csv.gz", cut)], 1, "flow_cut.csv.gz", n_lines=1)
+    check("what could be read is there", len(done.stdout.splitlines()) >= 2, done.stdout)
+    if os.path.exists("/dev/full"):
+        expect("full disk", ["egomotion", "flow.csv", "-o", "/dev/full"], 1, "/dev/full", n_lines=1)
+
+
 def test_lut():
     for arguments in (["calib.txt", "--size", "240x180"], ["calib.txt", "--step", "8", "--name", "lens"], ["good.yaml", "--step", "32"]):
         expect("lut", ["lut", *arguments, "-o", "camera-lut.h"], 0, ">camera-lut.h: ", n_lines=0)
@@ -589,7 +690,7 @@ def test_info():
 
 def main():
     try:
-        for test in (test_usage, test_replay, test_velocity, test_terminal, test_bad_input, test_attitude, test_lut, test_info):
+        for test in (test_usage, test_replay, test_velocity, test_terminal, test_bad_input, test_attitude, test_egomotion, test_lut, test_info):
             test()
     finally:
         shutil.rmtree(ROOT, ignore_errors=True)
