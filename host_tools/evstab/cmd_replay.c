@@ -62,7 +62,7 @@ static const evt_option_t OPTIONS[] = {
      "From flow to direction: erlv (default); erlv-paper, as\npublished; erl: also for a rotation that is unknown.",
      &opt.method, NULL},
     {"baseline-ms", '\0', "MIN:MAX",
-     "How far apart the two images of a pair may lie; within it\nas far as makes 4 px of flow. Default: 10:250.",
+     "How far apart the two images of a pair may lie; within it\nas far as makes 5 px of flow. Default: 10:250.",
      &opt.baseline, NULL},
     {"calib", '\0', "FILE", "Camera: fx fy cx cy k1 k2 p1 p2 k3, or YAML.", &opt.calib, NULL},
     {"imu", '\0', "FILE", "IMU samples: t ax ay az gx gy gz in text, or CSV\nwith a header.", &opt.imu, NULL},

@@ -16,7 +16,7 @@ evs_keyframes_config_t evs_keyframes_config_default(const evs_pinhole_t *pinhole
     EVS_ASSERT(pinhole != NULL);
     const evs_keyframes_config_t cfg = {.pinhole = *pinhole,
                                         .n_stored = 3u,
-                                        .target_px_q4 = 64u,
+                                        .target_px_q4 = 80u,
                                         .baseline_min_us = 10000u,
                                         .baseline_max_us = 250000u,
                                         .baseline_first_us = 70000u,

@@ -22,6 +22,7 @@ static void init(void)
 {
     evs_keyframes_config_t cfg = evs_keyframes_config_default(&pinhole);
     cfg.baseline_min_us = 30u * MS;
+    cfg.target_px_q4 = 4u * 16u;
     TEST_ASSERT_EQUAL_INT(EVS_OK, evs_keyframes_init(&k, &cfg, memory, N_BYTES));
 }
 

@@ -35,7 +35,7 @@ extern "C" {
 typedef struct {                /** Settings; copied by evs_keyframes_init(). */
     evs_pinhole_t pinhole;      /**< The camera of the images. */
     uint16_t n_stored;          /**< [1, EVS_KEYFRAMES_MAX], default 3. */
-    uint16_t target_px_q4;      /**< Displacement to aim at, 1/16 px. [1, 4096], default 64 (4 px). */
+    uint16_t target_px_q4;      /**< Displacement to aim at, 1/16 px. [1, 4096], default 80 (5 px). */
     uint32_t baseline_min_us;   /**< [1, baseline_first_us], default 10000. */
     uint32_t baseline_max_us;   /**< [baseline_min_us, age_max_us], default 250000. */
     uint32_t baseline_first_us; /**< Until the image speed is known: [min, max], default 70000. */

@@ -53,7 +53,7 @@ extern "C" {
 typedef struct {                      /** Settings; copied by evs_velocity_init(). */
     evs_keyframes_config_t keyframes; /**< Also holds the camera of the images. */
     evs_corners_config_t corners;     /**< Its size is set from the camera. */
-    evs_flow_config_t flow;
+    evs_flow_config_t flow;           /**< Default: windows of 25 px, 5 iterations. */
     evs_egomotion_config_t egomotion; /**< The method, and what may remain of the rotation. */
     uint16_t n_levels;                /**< Of the pyramids. [1, EVS_FLOW_LEVELS_MAX], default 2. */
     uint16_t n_tracks;  /**< Most corners tracked, [8, 4096]; 0, the default: one per cell of the corners. */
@@ -158,7 +158,7 @@ typedef struct { /** Context. A complete type only so that you can place it: eve
 
 /** The same for the default settings. */
 #define EVS_VELOCITY_DEFAULT_BYTES(width_px, height_px)                                                                \
-    EVS_VELOCITY_BYTES(width_px, height_px, 3u, 16u, 0u, 2u, 31u, 2u, 64u)
+    EVS_VELOCITY_BYTES(width_px, height_px, 3u, 16u, 0u, 2u, 25u, 2u, 64u)
 
 /** Defaults for a camera after undistortion. */
 evs_velocity_config_t evs_velocity_config_default(const evs_pinhole_t *pinhole);
