@@ -60,12 +60,16 @@ static void fill_rectangle(int x0, int y0, int x1, int y1, uint8_t grey)
     }
 }
 
-/* Noise, as it is or smoothed along and down. */
-static void fill_noise(uint16_t width, uint16_t height, bool smooth)
+/* Noise as it is, smoothed along and down, or faint and sparse: then many scores are small and equal, or next to it. */
+typedef enum { ROUGH = 0, SMOOTH = 1, FAINT = 2 } noise_t;
+
+static void fill_noise(uint16_t width, uint16_t height, noise_t noise)
 {
     const size_t n = (size_t)width * height;
-    for (size_t i = 0u; i < n; i++) { px[i] = (uint8_t)next_random(256u); }
-    for (size_t pass = 0u; smooth && (pass < 3u); pass++) {
+    for (size_t i = 0u; i < n; i++) {
+        px[i] = (uint8_t)((noise == FAINT) ? 100u + ((next_random(12u) == 0u) ? 1u : 0u) : next_random(256u));
+    }
+    for (size_t pass = 0u; (noise == SMOOTH) && (pass < 3u); pass++) {
         for (size_t i = 0u; i + 1u < n; i++) { px[i] = (uint8_t)((px[i] + px[i + 1u] + 1) / 2); }
         for (size_t i = 0u; i + width < n; i++) { px[i] = (uint8_t)((px[i] + px[i + width] + 1) / 2); }
     }
@@ -174,11 +178,11 @@ static void test_every_corner_is_that_of_the_definition(void)
     } CASES[] = {{W, H, 16, 10}, {W, H, 4, 0}, {W, H, 7, 100}, {64, 48, 16, 10}, {48, 61, 256, 0},
                  {7, 7, 16, 0},  {8, 9, 4, 0}, {W, 7, 16, 10}, {7, H, 5, 500},   {20, 20, 16, 1000}};
     for (size_t i = 0u; i < sizeof CASES / sizeof CASES[0]; i++) {
-        for (int smooth = 0; smooth < 2; smooth++) {
+        for (int noise = ROUGH; noise <= FAINT; noise++) {
             evs_corners_config_t cfg = evs_corners_config_default(CASES[i].width, CASES[i].height);
             cfg.cell_px = CASES[i].cell;
             cfg.min_permille = CASES[i].permille;
-            fill_noise(cfg.width_px, cfg.height_px, smooth != 0);
+            fill_noise(cfg.width_px, cfg.height_px, (noise_t)noise);
             assert_as_model(&cfg);
         }
     }
@@ -214,7 +218,7 @@ static void test_images_without_corners_have_none(void)
     static const uint16_t SMALL[][2] = {{1, 1}, {6, 40}, {40, 6}};
     for (size_t i = 0u; i < 3u; i++) {
         cfg = evs_corners_config_default(SMALL[i][0], SMALL[i][1]);
-        fill_noise(cfg.width_px, cfg.height_px, false);
+        fill_noise(cfg.width_px, cfg.height_px, ROUGH);
         TEST_ASSERT_EQUAL_UINT(0u, find(&cfg, N_CELLS));
     }
 }
@@ -240,7 +244,7 @@ static void test_the_hardest_contrast_stays_exact(void)
 static void test_fewer_are_the_best_ones_and_of_equals_the_first(void)
 {
     const evs_corners_config_t cfg = evs_corners_config_default(W, H);
-    fill_noise(W, H, true);
+    fill_noise(W, H, SMOOTH);
     const size_t n_all = model(&cfg, want);
     TEST_ASSERT_TRUE(n_all > 10u);
     for (size_t max = 0u; max <= n_all; max++) {

@@ -339,13 +339,17 @@ static void test_a_coarse_level_or_a_prediction_reaches_farther(void)
     evs_flow_track(&flow, &first, &second, tracks, n);
     TEST_ASSERT_TRUE_MESSAGE(count_near(n, dx, dy, 0.05) > n * 3u / 4u, "three levels should reach that far");
     second.n_levels = 1u; /* The smaller number of levels counts. */
-    tracks[0].to = tracks[0].from;
-    evs_flow_track(&flow, &first, &second, tracks, 1u);
-    const evs_position_t with_one = tracks[0].to;
+    evs_flow_track_t with_one[N_TRACKS];
+    for (size_t i = 0u; i < n; i++) { tracks[i].to = tracks[i].from; }
+    evs_flow_track(&flow, &first, &second, tracks, n);
+    memcpy(with_one, tracks, sizeof with_one);
     build(1u);
-    tracks[0].to = tracks[0].from;
-    evs_flow_track(&flow, &first, &second, tracks, 1u);
-    TEST_ASSERT_EQUAL_MEMORY(&with_one, &tracks[0].to, sizeof with_one);
+    for (size_t i = 0u; i < n; i++) { tracks[i].to = tracks[i].from; }
+    evs_flow_track(&flow, &first, &second, tracks, n);
+    for (size_t i = 0u; i < n; i++) {
+        TEST_ASSERT_EQUAL_MEMORY(&with_one[i].to, &tracks[i].to, sizeof tracks[i].to);
+        TEST_ASSERT_EQUAL_UINT8(with_one[i].status, tracks[i].status);
+    }
 }
 
 /* A step that is short ends the search: with a coarse epsilon fewer are made. */
@@ -442,7 +446,7 @@ static void test_texture_counts_from_min_eigen_on(void)
     }
 }
 
-static void test_a_flat_coarse_level_does_not_end_a_track(void)
+static void test_only_the_finest_level_must_have_texture(void)
 {
     scene(0.4, -0.3, 2u);
     memset(first_levels, 99, sizeof first_levels);
@@ -450,6 +454,10 @@ static void test_a_flat_coarse_level_does_not_end_a_track(void)
     init(&cfg);
     track_one(50.0, 40.0, 50.0, 40.0);
     assert_tracked(tracks[0], 0.4, -0.3, 0.06);
+    scene(0.4, -0.3, 2u);
+    memset(first_px, 99, sizeof first_px);
+    track_one(50.0, 40.0, 50.0, 40.0);
+    TEST_ASSERT_EQUAL_INT(EVS_FLOW_LOST_TEXTURE, tracks[0].status);
 }
 
 /* Moved farther than one level reaches, most tracks end somewhere wrong. */
@@ -568,6 +576,42 @@ static void test_the_hardest_contrast_overflows_nothing(void)
     }
 }
 
+/* Blocks of 2 px in black and white have the steepest gradients everywhere; moved by 1 px the pull of a whole window is
+ * beyond 32 bits, and must still pull the right way. */
+static void test_the_strongest_pull_has_the_right_direction(void)
+{
+    for (int along = 0; along < 2; along++) {
+        for (int y = 0; y < H; y++) {
+            for (int x = 0; x < W; x++) {
+                const int u = x + 2 - (1 - along), v = y + 2 - along;
+                first_px[y * W + x] = (((x / 2) ^ (y / 2)) & 1) ? 255u : 0u;
+                second_px[y * W + x] = (((u / 2 - 1) ^ (v / 2 - 1)) & 1) ? 255u : 0u;
+            }
+        }
+        build(1u);
+        const evs_flow_config_t cfg = config(31u, 1u, 10u);
+        init(&cfg);
+        track_one(50.0, 40.0, 50.0, 40.0);
+        assert_tracked(tracks[0], 1 - along, along, 0.05);
+    }
+}
+
+/* A faint template and an image of high contrast call for a step of many windows: it is cut to half of one. */
+static void test_no_step_is_longer_than_half_a_window(void)
+{
+    memset(first_px, 100, sizeof first_px);
+    for (int y = 39; y < 42; y++) { memset(&first_px[y * W + 49], 103, 3u); }
+    for (size_t i = 0u; i < W * H; i++) { second_px[i] = (i % W < 50u) ? 0u : 255u; }
+    build(1u);
+    evs_flow_config_t cfg = config(15u, 1u, 1u);
+    cfg.min_eigen_q8 = 1u;
+    cfg.max_backward_q8 = 0u;
+    init(&cfg);
+    track_one(50.0, 40.0, 50.0, 40.0);
+    TEST_ASSERT_EQUAL_INT(EVS_FLOW_OK, tracks[0].status);
+    TEST_ASSERT_EQUAL_INT32(7 * 256, (int32_t)evs_abs_u32(tracks[0].to.x_q8 - 50 * 256));
+}
+
 static void test_images_smaller_than_a_window_are_tracked_or_lost(void)
 {
     static const uint16_t SIZES[][2] = {{1, 1}, {2, 3}, {9, 40}, {40, 5}, {20, 20}};
@@ -590,10 +634,10 @@ static void test_images_smaller_than_a_window_are_tracked_or_lost(void)
 static void test_the_border_goes_on(void)
 {
     enum { MARGIN = 20 }; /* A window of 15 px may lie 7 px outside, and sees 7 more and 2 for gradients. */
-    static const uint16_t SIZES[][2] = {{1, 9}, {2, 9}, {3, 2}, {5, 30}, {6, 3}, {30, 5}, {40, 30}};
-    static uint8_t small_px[2][40 * 30];
+    static const uint16_t SIZES[][2] = {{1, 9}, {2, 9}, {3, 2}, {5, 30}, {6, 3}, {30, 5}, {40, 30}, {60, 38}};
+    static uint8_t small_px[2][60 * 38];
     size_t n_compared = 0u;
-    for (size_t s = 0u; s < 7u; s++) {
+    for (size_t s = 0u; s < 8u; s++) {
         const uint16_t w = SIZES[s][0], h = SIZES[s][1];
         evs_pyramid_t small[2], large[2];
         for (size_t k = 0u; k < 2u; k++) {
@@ -602,6 +646,10 @@ static void test_the_border_goes_on(void)
                 const int32_t grey =
                     (k == 0u) ? (int32_t)next_random(256u) : small_px[0][i] + (int32_t)next_random(60u);
                 small_px[k][i] = (uint8_t)evs_clamp(grey, 0, 255);
+                if (s == 7u) { /* Steps of some pixels, past what the patch has to spare. */
+                    const double x = (double)(int)(i % w), y = (double)(int)(i / w);
+                    small_px[k][i] = (uint8_t)lround(texture(x - 3.0 * (int)k, y - 4.5 * (int)k));
+                }
             }
             for (int y = 0; y < H; y++) {
                 for (int x = 0; x < W; x++) {
@@ -693,11 +741,13 @@ int main(void)
     RUN_TEST(test_residual_is_the_mean_difference_of_grey);
     RUN_TEST(test_flat_images_and_stripes_have_no_texture);
     RUN_TEST(test_texture_counts_from_min_eigen_on);
-    RUN_TEST(test_a_flat_coarse_level_does_not_end_a_track);
+    RUN_TEST(test_only_the_finest_level_must_have_texture);
     RUN_TEST(test_the_way_back_finds_wrong_tracks);
     RUN_TEST(test_points_off_the_image_are_refused_and_not_moved);
     RUN_TEST(test_a_point_that_leaves_the_image_is_lost_at_the_border);
     RUN_TEST(test_the_hardest_contrast_overflows_nothing);
+    RUN_TEST(test_the_strongest_pull_has_the_right_direction);
+    RUN_TEST(test_no_step_is_longer_than_half_a_window);
     RUN_TEST(test_images_smaller_than_a_window_are_tracked_or_lost);
     RUN_TEST(test_the_border_goes_on);
     RUN_TEST(test_bits_are_those_of_every_other_target);
