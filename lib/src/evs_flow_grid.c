@@ -234,9 +234,9 @@ static void spread(evs_flow_grid_t *grid, uint64_t known)
 
 size_t evs_flow_grid_fill(evs_flow_grid_t *grid, const evs_flow_sample_t *samples, size_t n)
 {
-    EVS_ASSERT((grid != NULL) && ((samples != NULL) || (n == 0u)));
+    EVS_ASSERT((grid != NULL) && ((samples != NULL) || (n == 0u)) && (n <= UINT16_MAX));
     const uint32_t n_tiles = tile_count(grid);
-    uint32_t n_in[EVS_FLOW_GRID_TILES_MAX + 1u] = {0};
+    uint16_t n_in[EVS_FLOW_GRID_TILES_MAX + 1u] = {0};
     for (size_t i = 0u; i < n; i++) { n_in[evs_flow_grid_tile_of(grid, samples[i].at)]++; }
     const size_t n_on = n - n_in[EVS_FLOW_GRID_TILES_MAX];
     if (n_on == 0u) { return 0u; }

@@ -28,6 +28,12 @@
 #define FIRST_STEP_Q6 (8 * PX_Q6)
 #define LAST_STEP_Q6  PX_Q6
 
+/* Of tiles, the coarser levels only have to find where the next begins. They look at no more events than this per
+ * search, and at cells of 2 px. */
+#define FIRST_EVENTS  4000u
+#define COARSE_EVENTS 2000u
+#define COARSE_SHIFT  1u
+
 /* Moves per step size. With the halving of steps it bounds the number of evaluations; four moves of 8 px are max_px. */
 #define MAX_MOVES 4u
 
@@ -48,6 +54,7 @@ typedef struct { /* Tiles next to each other, whose events are moved together; t
 typedef struct { /* The search for the displacement of one block. */
     block_t block;
     evs_warp_view_t view;
+    uint32_t stride; /* every how many of its events are looked at */
     offset_t held_at;
     uint64_t hold_q16; /* the contrast that a px^2 away from there costs; 0: nothing holds it */
     offset_t best;
@@ -125,11 +132,11 @@ static size_t count_on_image(const evs_flow_grid_t *grid, const evs_point_t *poi
 }
 
 /* Time from the middle of the window by its length, within +-1/2 even if times do not ascend. */
-static int16_t window_time_q15(uint32_t t_us, uint32_t middle_us, uint32_t per_us, unsigned shift)
+static int16_t window_time_q12(uint32_t t_us, uint32_t middle_us, uint32_t per_us, unsigned shift)
 {
     const int64_t dt = evs_time_diff_us(t_us, middle_us);
-    const int32_t dt_q15 = evs_sat32(evs_shr_r64(dt * (int64_t)(per_us >> 1), shift - 16u));
-    return (int16_t)evs_clamp(dt_q15, -16384, 16384);
+    const int32_t dt_q12 = evs_sat32(evs_shr_r64(dt * (int64_t)(per_us >> 1), shift - 13u));
+    return (int16_t)evs_clamp(dt_q12, -2048, 2048);
 }
 
 /* A place in [-1/2, 1/2) px from the upper bits of a hash. */
@@ -174,7 +181,7 @@ static size_t take_events(evs_warp_t *warp, const evs_event_t *ev, const evs_poi
             evs_warp_event_t *const to = &warp->events[first[tile]++];
             to->x_q4 = (int16_t)(points[i].x_q4 + within_pixel_q4(n_placed * UINT32_C(0x9E3779B9)));
             to->y_q4 = (int16_t)(points[i].y_q4 + within_pixel_q4(n_placed * UINT32_C(0x85EBCA6B)));
-            to->dt_q15 = window_time_q15(ev[i].t_us, middle_us, per_us, shift);
+            to->dt_q12 = window_time_q12(ev[i].t_us, middle_us, per_us, shift);
             n_placed++;
             wait = stride;
         }
@@ -202,8 +209,8 @@ static uint32_t count_events(const evs_warp_t *warp, const block_t *block)
     return n;
 }
 
-/* The part of the image in which the events of a block may fall, in cells of 2^shift px. */
-static evs_warp_view_t view_of(const evs_warp_t *warp, const block_t *block, unsigned shift)
+/* The part of the image in which the events of a block fall when moved by up to a reach, in cells of 2^shift px. */
+static evs_warp_view_t view_of(const evs_warp_t *warp, const block_t *block, offset_t reach, unsigned shift)
 {
     const evs_warp_config_t *const cfg = &warp->cfg;
     const uint32_t n_cols = warp->tiles.n_cols;
@@ -212,33 +219,46 @@ static evs_warp_view_t view_of(const evs_warp_t *warp, const block_t *block, uns
     const uint32_t y0 = block->row0 * cfg->height_px / n_rows;
     const uint32_t x1 = (block->col1 * cfg->width_px + n_cols - 1u) / n_cols;
     const uint32_t y1 = (block->row1 * cfg->height_px + n_rows - 1u) / n_rows;
-    const int32_t margin = (int32_t)EVS_WARP_MARGIN_PX(cfg->max_px);
-    const evs_warp_view_t view = {.width = EVS_WARP_SIDE(x1 - x0, cfg->max_px, shift),
-                                  .height = EVS_WARP_SIDE(y1 - y0, cfg->max_px, shift),
+    const uint32_t reach_x_px = ((uint32_t)reach.x + PX_Q6 - 1u) / PX_Q6;
+    const uint32_t reach_y_px = ((uint32_t)reach.y + PX_Q6 - 1u) / PX_Q6;
+    const evs_warp_view_t view = {.width = EVS_WARP_SIDE(x1 - x0, reach_x_px, shift),
+                                  .height = EVS_WARP_SIDE(y1 - y0, reach_y_px, shift),
                                   .shift = shift,
-                                  .x_px = (int32_t)x0 - margin,
-                                  .y_px = (int32_t)y0 - margin};
+                                  .x_px = (int32_t)x0 - (int32_t)EVS_WARP_MARGIN_PX(reach_x_px),
+                                  .y_px = (int32_t)y0 - (int32_t)EVS_WARP_MARGIN_PX(reach_y_px)};
     return view;
 }
 
-/* The finest view of a block that there is memory for: at the resolution of the whole image there is for every block. */
-static evs_warp_view_t finest_view(const evs_warp_t *warp, const block_t *block)
+/* The finest view of a block, from a shift on, that there is memory for: at the resolution of the whole image there is for every block. */
+static evs_warp_view_t finest_view(const evs_warp_t *warp, const block_t *block, offset_t reach, unsigned shift)
 {
-    evs_warp_view_t view = view_of(warp, block, 0u);
-    for (unsigned shift = 1u; view.width * (view.height + 2u) > warp->n_cells; shift++) {
-        view = view_of(warp, block, shift);
+    evs_warp_view_t view = view_of(warp, block, reach, shift);
+    while (view.width * (view.height + 2u) > warp->n_cells) {
+        shift++;
+        view = view_of(warp, block, reach, shift);
     }
     return view;
+}
+
+/* Vote for all events of a block; false when a cell has wrapped. */
+static bool vote(evs_warp_t *warp, const search_t *s, offset_t d, bool limited)
+{
+    memset(warp->cells, 0, (size_t)s->view.width * (s->view.height + 1u) * sizeof warp->cells[0]);
+    for (uint32_t row = s->block.row0; row < s->block.row1; row++) {
+        const evs_warp_event_t *const ev = warp->events + events_before(warp, row, s->block.col0);
+        const uint32_t n = events_before(warp, row, s->block.col1) - events_before(warp, row, s->block.col0);
+        if (limited) {
+            evs_warp_vote_limited(&s->view, warp->cells, ev, n, s->stride, d.x, d.y);
+        } else if (!evs_warp_vote(&s->view, warp->cells, ev, n, s->stride, d.x, d.y)) {
+            return false;
+        }
+    }
+    return true;
 }
 
 static uint64_t contrast(evs_warp_t *warp, const search_t *s, offset_t d)
 {
-    memset(warp->cells, 0, (size_t)s->view.width * (s->view.height + 1u) * sizeof warp->cells[0]);
-    for (uint32_t row = s->block.row0; row < s->block.row1; row++) {
-        const uint32_t begin = events_before(warp, row, s->block.col0);
-        const uint32_t end = events_before(warp, row, s->block.col1);
-        evs_warp_vote(&s->view, warp->cells, warp->events + begin, end - begin, d.x, d.y);
-    }
+    if (!vote(warp, s, d, false)) { (void)vote(warp, s, d, true); }
     warp->n_evaluations++;
     return evs_warp_contrast(&s->view, warp->cells, warp->cfg.cost);
 }
@@ -362,7 +382,8 @@ static uint64_t noise_gain(const evs_warp_t *warp, const search_t *s, offset_t f
     const uint32_t side_q8 = evs_sqrt_u64(area_px << 16) >> s->view.shift;
     const uint64_t factor = (warp->cfg.cost == EVS_WARP_GRADIENT) ? NOISE_GRADIENT : NOISE_MEAN_SQUARE;
     /* 20 + 16 + 9 bits, and 2 to get from Q6 to Q8 */
-    return ((factor * count_events(warp, &s->block) * distance_q6) << 2) / ((side_q8 > 0u) ? side_q8 : 1u);
+    return ((factor * (count_events(warp, &s->block) / s->stride) * distance_q6) << 2) /
+           ((side_q8 > 0u) ? side_q8 : 1u);
 }
 
 /* --- levels ---------------------------------------------------------------------------------------------------- */
@@ -376,17 +397,17 @@ static unsigned first_shift(const evs_warp_t *warp, int32_t step_q6)
 }
 
 /* One displacement for all events. Leaves the view at the resolution of the last steps. */
-static void search_all(evs_warp_t *warp, search_t *s, offset_t initial)
+static void search_all(evs_warp_t *warp, search_t *s, offset_t initial, uint32_t stride)
 {
+    const int32_t reach = warp->cfg.max_px * PX_Q6;
+    s->stride = stride;
     s->block = (block_t){0u, warp->tiles.n_cols, 0u, warp->tiles.n_rows};
     s->view = (evs_warp_view_t){.shift = 0u};
     s->best = initial;
-    int32_t step_q6 = FIRST_STEP_Q6;
-    while (2 * step_q6 > (int32_t)warp->cfg.max_px * PX_Q6) { step_q6 /= 2; }
-    for (; step_q6 >= LAST_STEP_Q6; step_q6 /= 2) {
+    for (int32_t step_q6 = FIRST_STEP_Q6; step_q6 >= LAST_STEP_Q6; step_q6 /= 2) {
         const unsigned shift = first_shift(warp, step_q6);
         if (shift != s->view.shift) { /* another image: what a coarser one has found must hold there, too */
-            s->view = view_of(warp, &s->block, shift);
+            s->view = view_of(warp, &s->block, (offset_t){reach, reach}, shift);
             search_begin(warp, s, s->best, false);
             search_try(warp, s, initial);
             search_try(warp, s, ZERO);
@@ -445,6 +466,26 @@ static void set_up(evs_flow_grid_t *grid, const evs_warp_config_t *cfg, uint32_t
 
 static uint32_t ceil_shift(uint32_t n, uint32_t shift) { return (n + (UINT32_C(1) << shift) - 1u) >> shift; }
 
+static int32_t max_abs(int32_t a, int32_t b)
+{
+    const int32_t x = (a < 0) ? -a : a;
+    const int32_t y = (b < 0) ? -b : b;
+    return (x > y) ? x : y;
+}
+
+/* How far a search from one of two places can get: the moves, and half a step by the parabola. */
+static offset_t reach_around(const evs_warp_config_t *cfg, offset_t a, offset_t b)
+{
+    const int32_t search_q6 = (int32_t)(MAX_MOVES + 1u) * LAST_STEP_Q6 + LAST_STEP_Q6 / 2;
+    const int32_t limit = cfg->max_px * PX_Q6;
+    const offset_t reach = {evs_clamp(max_abs(a.x, b.x) + search_q6, 0, limit),
+                            evs_clamp(max_abs(a.y, b.y) + search_q6, 0, limit)};
+    return reach;
+}
+
+/* To look at no more than so many of n events. */
+static uint32_t stride_for(uint32_t n, uint32_t most) { return (n + most - 1u) / most; }
+
 /* What the last level adds up over its tiles. */
 typedef struct {
     uint64_t unmoved;
@@ -462,8 +503,10 @@ static offset_t search_tile(evs_warp_t *warp, uint32_t col, uint32_t row)
     search_t s = {.block = {col * tiles->n_cols / level->n_cols, (col + 1u) * tiles->n_cols / level->n_cols,
                             row * tiles->n_rows / level->n_rows, (row + 1u) * tiles->n_rows / level->n_rows},
                   .best = offset_of(evs_flow_grid_at(&warp->parent, centre))};
-    if (count_events(warp, &s.block) < warp->cfg.n_min) { return s.best; }
-    s.view = finest_view(warp, &s.block);
+    const uint32_t n = count_events(warp, &s.block);
+    if (n < warp->cfg.n_min) { return s.best; }
+    s.stride = stride_for(n, COARSE_EVENTS);
+    s.view = finest_view(warp, &s.block, reach_around(&warp->cfg, s.best, s.best), COARSE_SHIFT);
     search_begin(warp, &s, s.best, true);
     search_nearby(warp, &s);
     return s.best;
@@ -474,9 +517,12 @@ static offset_t search_last_tile(evs_warp_t *warp, uint32_t col, uint32_t row, o
                                  sums_t *sums)
 {
     const evs_point_t centre = evs_flow_grid_centre(&warp->level, (uint16_t)col, (uint16_t)row);
-    search_t s = {.block = {col, col + 1u, row, row + 1u}, .best = offset_of(evs_flow_grid_at(&warp->parent, centre))};
+    search_t s = {.block = {col, col + 1u, row, row + 1u},
+                  .stride = 1u,
+                  .best = offset_of(evs_flow_grid_at(&warp->parent, centre))};
     if (count_events(warp, &s.block) < warp->cfg.n_min) { return s.best; }
-    s.view = finest_view(warp, &s.block);
+    const offset_t others = {max_abs(all.x, initial.x), max_abs(all.y, initial.y)};
+    s.view = finest_view(warp, &s.block, reach_around(&warp->cfg, s.best, others), 0u);
     search_begin(warp, &s, s.best, true);
     const int64_t unmoved = score_at(warp, &s, ZERO);
     const int64_t as_one = score_at(warp, &s, all);
@@ -580,7 +626,7 @@ void evs_warp_estimate(evs_warp_t *warp, const evs_event_t *ev, const evs_point_
     const offset_t begin =
         (initial == NULL) ? ZERO : offset_from_velocity(cfg, mean_velocity(initial), (uint32_t)span_us);
     search_t s;
-    search_all(warp, &s, begin);
+    search_all(warp, &s, begin, tiled ? stride_for(result->n_events, FIRST_EVENTS) : 1u);
     const uint64_t unmoved = contrast(warp, &s, ZERO);
     const bool believe_one = is_believed(cfg, (uint64_t)s.score, unmoved, noise_gain(warp, &s, ZERO));
     const offset_t all = believe_one ? s.best : begin;
@@ -618,6 +664,28 @@ void evs_warp_estimate(evs_warp_t *warp, const evs_event_t *ev, const evs_point_
 
 static bool on_range(int32_t q4) { return (q4 >= -EVS_POINT_MAX_Q4) && (q4 <= EVS_POINT_MAX_Q4); }
 
+/* Times of a window, for which time * EVS_FLOW_PER_US fits 32 bits: the same product as any other's, but cheaper. */
+#define NEAR_US (INT32_MAX / EVS_FLOW_PER_US)
+
+static evs_point_t move(evs_point_t p, evs_flow_velocity_t v, int32_t dt_us)
+{
+    int32_t x_q4;
+    int32_t y_q4;
+    if ((dt_us >= -NEAR_US) && (dt_us <= NEAR_US)) {
+        const int32_t factor = -dt_us * EVS_FLOW_PER_US;
+        x_q4 = p.x_q4 + (int32_t)evs_shr_r64((int64_t)v.x_px_s_q3 * factor, 35u);
+        y_q4 = p.y_q4 + (int32_t)evs_shr_r64((int64_t)v.y_px_s_q3 * factor, 35u);
+    } else { /* the least time has no negative */
+        const int32_t back_us = (dt_us == INT32_MIN) ? INT32_MAX : -dt_us;
+        x_q4 = p.x_q4 + evs_flow_displacement_q4(v.x_px_s_q3, back_us);
+        y_q4 = p.y_q4 + evs_flow_displacement_q4(v.y_px_s_q3, back_us);
+    }
+    if (!on_range(x_q4) || !on_range(y_q4)) { return evs_point_outside(); }
+    p.x_q4 = (int16_t)x_q4;
+    p.y_q4 = (int16_t)y_q4;
+    return p;
+}
+
 void evs_warp_map(const evs_flow_grid_t *grid, const evs_event_t *ev, const evs_point_t *in, size_t n,
                   uint32_t t_ref_us, evs_point_t *out)
 {
@@ -628,15 +696,6 @@ void evs_warp_map(const evs_flow_grid_t *grid, const evs_event_t *ev, const evs_
             out[i] = p;
             continue;
         }
-        const evs_flow_velocity_t v = evs_flow_grid_at(grid, p);
-        const int32_t dt_us = evs_time_diff_us(ev[i].t_us, t_ref_us);
-        const int32_t x_q4 = p.x_q4 - evs_flow_displacement_q4(v.x_px_s_q3, dt_us);
-        const int32_t y_q4 = p.y_q4 - evs_flow_displacement_q4(v.y_px_s_q3, dt_us);
-        if (on_range(x_q4) && on_range(y_q4)) {
-            out[i].x_q4 = (int16_t)x_q4;
-            out[i].y_q4 = (int16_t)y_q4;
-        } else {
-            out[i] = evs_point_outside();
-        }
+        out[i] = move(p, evs_flow_grid_at(grid, p), evs_time_diff_us(ev[i].t_us, t_ref_us));
     }
 }

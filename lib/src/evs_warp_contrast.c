@@ -4,37 +4,61 @@
 
 #include <string.h>
 
-/* A vote is 256 in all, so that a cell holds 256 events at the same place; a hot pixel must not wrap it. */
-static inline void add(uint16_t *cell, uint32_t vote)
+/* Votes on one cell, if they fit. */
+static inline uint32_t add(uint16_t *cell, uint32_t vote, uint32_t most)
 {
     const uint32_t sum = *cell + vote;
-    *cell = (uint16_t)((sum > UINT16_MAX) ? UINT16_MAX : sum);
+    *cell = (uint16_t)((sum > most) ? most : sum);
+    return sum;
 }
 
-void evs_warp_vote(const evs_warp_view_t *view, uint16_t *cells, const evs_warp_event_t *ev, size_t n, int32_t dx_q6,
-                   int32_t dy_q6)
+/*
+ * A vote is 256 in all, so that a cell holds 255 events at the same place: a hot pixel would wrap it. That is rare, and a
+ * limit for every vote is a sixth of the work. So votes are first added without (most = UINT32_MAX), and the result
+ * tells whether some cell has wrapped.
+ *
+ * A position is below 2^12 px, a displacement below 2^5; in Q18 both together fit 32 bits.
+ */
+static inline bool vote_all(const evs_warp_view_t *view, uint16_t *cells, const evs_warp_event_t *ev,
+                            const evs_warp_event_t *end, uint32_t stride, int32_t dx_q6, int32_t dy_q6, uint32_t most)
 {
-    const unsigned down = view->shift + 2u; /* from Q6 px to Q4 cells */
+    const unsigned down = 14u + view->shift; /* from Q18 px to Q4 cells, rounded */
     const int32_t half = (int32_t)(UINT32_C(1) << (down - 1u));
-    const int32_t x0_q6 = view->x_px * 64 - half;
-    const int32_t y0_q6 = view->y_px * 64 - half;
+    const int32_t x0_q18 = half - view->x_px * (1 << 18);
+    const int32_t y0_q18 = half - view->y_px * (1 << 18);
     const uint32_t width = view->width;
-    const uint32_t height = view->height;
-    for (size_t i = 0u; i < n; i++) {
-        const int32_t x_q4 = (ev[i].x_q4 * 4 - evs_shr_r(ev[i].dt_q15 * dx_q6, 15u) - x0_q6) >> down;
-        const int32_t y_q4 = (ev[i].y_q4 * 4 - evs_shr_r(ev[i].dt_q15 * dy_q6, 15u) - y0_q6) >> down;
+    const uint32_t last_x = view->width - 1u;
+    const uint32_t last_y = view->height - 1u;
+    uint32_t sums = 0u;
+    for (; ev < end; ev += stride) {
+        const int32_t x_q4 = (x0_q18 + ev->x_q4 * (1 << 14) - ev->dt_q12 * dx_q6) >> down;
+        const int32_t y_q4 = (y0_q18 + ev->y_q4 * (1 << 14) - ev->dt_q12 * dy_q6) >> down;
         const uint32_t x = (uint32_t)(x_q4 >> 4);
         const uint32_t y = (uint32_t)(y_q4 >> 4);
-        if ((x >= width - 1u) || (y >= height - 1u)) { continue; }
+        if ((x >= last_x) || (y >= last_y)) { continue; }
         const uint32_t fx = (uint32_t)x_q4 & 15u;
         const uint32_t fy = (uint32_t)y_q4 & 15u;
         const uint32_t both = fx * fy;
         uint16_t *const cell = cells + y * width + x;
-        add(cell, 256u - 16u * (fx + fy) + both);
-        add(cell + 1, 16u * fx - both);
-        add(cell + width, 16u * fy - both);
-        add(cell + width + 1, both);
+        uint16_t *const below = cell + width;
+        sums |= add(cell, 256u - 16u * (fx + fy) + both, most);
+        sums |= add(cell + 1, 16u * fx - both, most);
+        sums |= add(below, 16u * fy - both, most);
+        sums |= add(below + 1, both, most);
     }
+    return sums <= UINT16_MAX;
+}
+
+bool evs_warp_vote(const evs_warp_view_t *view, uint16_t *cells, const evs_warp_event_t *ev, size_t n, uint32_t stride,
+                   int32_t dx_q6, int32_t dy_q6)
+{
+    return vote_all(view, cells, ev, ev + n, stride, dx_q6, dy_q6, UINT32_MAX);
+}
+
+void evs_warp_vote_limited(const evs_warp_view_t *view, uint16_t *cells, const evs_warp_event_t *ev, size_t n,
+                           uint32_t stride, int32_t dx_q6, int32_t dy_q6)
+{
+    (void)vote_all(view, cells, ev, ev + n, stride, dx_q6, dy_q6, UINT16_MAX);
 }
 
 /* 1 2 1 down a column of three rows. */

@@ -51,6 +51,12 @@ PER_PIXEL = [
     ("image of a time surface", "RENDER_SURFACE"),
     ("half an image, per pixel of the whole", "HALVE"),
 ]
+PER_ESTIMATE = [
+    ("warp: one velocity from 6000 events, mean square", "WARP_GLOBAL"),
+    ("warp: one velocity from 6000 events, gradient", "WARP_GLOBAL_GRADIENT"),
+    ("warp: 8 x 6 tiles from 16000 events, mean square", "WARP_TILED"),
+    ("warp: 8 x 6 tiles from 16000 events, gradient", "WARP_TILED_GRADIENT"),
+]
 PER_CALL = [("new orientation, once per slice of at most 1 ms", "SLICE")]
 PER_UPDATE = [
     ("attitude: gyro sample", "GYRO"),
@@ -88,6 +94,7 @@ def table(head, rows):
 def generate(trees, plugin):
     number = constants()
     counts, attitude, images, flow, solve = {}, {}, {}, {}, {}
+    counts, attitude, images, warp = {}, {}, {}, {}
     for tree in trees:
         image = os.path.join(tree.path, "tests", "bench", "bench_events")
         counts[tree.name], _ = count(plugin, RUN_QEMU, TARGETS[tree.name][1], image)
@@ -99,6 +106,8 @@ def generate(trees, plugin):
         flow[tree.name], _ = count(plugin, RUN_QEMU, TARGETS[tree.name][1], image)
         image = os.path.join(tree.path, "tests", "bench", "bench_egomotion")
         solve[tree.name], _ = count(plugin, RUN_QEMU, TARGETS[tree.name][1], image)
+        image = os.path.join(tree.path, "tests", "bench", "bench_warp")
+        warp[tree.name], _ = count(plugin, RUN_QEMU, TARGETS[tree.name][1], image)
 
     def per_call(name, tree, counts=counts, expected=number["BATCHES"]):
         calls, insns = counts[tree.name][number[name]]
@@ -112,11 +121,15 @@ def generate(trees, plugin):
     n_batches = number["IMAGES"] * number["IMAGE_BATCHES"]
     rows += [[row] + [f"{per_call(region, t, images, n_batches) / number['EVENTS']:.1f}" for t in trees]
              for row, region in PER_EVENT_OF_IMAGES]
+    rows += [["warp: moving events by a flow grid"] +
+             [f"{per_call('WARP_MAP', t, warp, 1) / number['WARP_EVENTS']:.1f}" for t in trees]]
     out = "Instructions per event:\n\n" + table(["step"] + names, rows)
     n_px = number["IMAGE_WIDTH"] * number["IMAGE_HEIGHT"]
     rows = [[row] + [f"{per_call(region, t, images, number['IMAGES']) / n_px:.1f}" for t in trees]
             for row, region in PER_PIXEL]
     out += "\nInstructions per pixel of an image of 12288 events at 240 x 180:\n\n" + table(["step"] + names, rows)
+    rows = [[row] + [f"{per_call(region, t, warp, 1) / 1e6:.1f}" for t in trees] for row, region in PER_ESTIMATE]
+    out += "\nMillions of instructions per window of 16000 events at 240 x 180:\n\n" + table(["step"] + names, rows)
     rows = [[row] + [f"{per_call(region, t):.0f}" for t in trees] for row, region in PER_CALL]
     rows += [[row] + [f"{per_call(region, t, attitude, number['UPDATES']):.0f}" for t in trees]
              for row, region in PER_UPDATE]

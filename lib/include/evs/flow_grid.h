@@ -11,7 +11,7 @@
  *          Tiles without a velocity of their own take the mean of their neighbours, ring by ring; when no tile is
  *          left, all take the median of all samples.
  * Memory   one evs_flow_grid_t, no more.
- * Cost     evs_flow_grid_at() about 60 instructions, no division. evs_flow_grid_fill() one look at each sample per tile.
+ * Cost     evs_flow_grid_at() 110 instructions on a Cortex-M7, no division. evs_flow_grid_fill() one look at each sample per tile.
  * Numeric  integers only, bit-exact on every target. Velocities in 1/8 px/s, up to 4095 px/s, saturating. Lookup
  *          errs by less than 1 LSB and 2^-10 of the difference between neighbouring tiles.
  * Time     intervals in us of 32 bits; no clock.
@@ -81,7 +81,8 @@ void evs_flow_grid_set_tile(evs_flow_grid_t *grid, uint16_t col, uint16_t row, e
 
 /**
  * Replace all velocities by those of samples. Samples off the image are ignored; without any other the grid is left as
- * it is. Of more than 32 samples in a tile (and more than 32 * tiles in the image) every k-th is used.
+ * it is. Of more than 32 samples in a tile (for evs_flow_grid_global(): on the image) every k-th is used.
+ * @param n  At most 65535.
  * @return the number of samples on the image.
  */
 size_t evs_flow_grid_fill(evs_flow_grid_t *grid, const evs_flow_sample_t *samples, size_t n);

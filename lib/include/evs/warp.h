@@ -21,7 +21,7 @@
  * Memory   one evs_warp_t and EVS_WARP_BYTES() of caller memory: 6 bytes per event of the budget and an image of 16-bit
  *          cells at half resolution.
  * Cost     the number of evaluations is bounded; docs/performance.md has instructions per estimate.
- *          evs_warp_map() about 120 instructions per event.
+ *          evs_warp_map() about 155 instructions per event.
  * Numeric  integers only, bit-exact on every target. Displacements over the window in 1/64 px, within max_px.
  * Time     wraps; the events of a window must span less than 2^31 us.
  * Threads  no shared state; one context must not be entered from two threads or ISRs at once.
@@ -95,7 +95,7 @@ typedef struct {
 typedef struct {
     int16_t x_q4;
     int16_t y_q4;
-    int16_t dt_q15; /* time from the middle of the window, by the length of the window */
+    int16_t dt_q12; /* time from the middle of the window, by its length: within +-1/2 */
 } evs_warp_event_t;
 
 EVS_STATIC_ASSERT(sizeof(evs_warp_event_t) == 6u, "an event of the search is 6 bytes");
