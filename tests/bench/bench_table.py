@@ -93,8 +93,7 @@ def table(head, rows):
 
 def generate(trees, plugin):
     number = constants()
-    counts, attitude, images, flow, solve = {}, {}, {}, {}, {}
-    counts, attitude, images, warp = {}, {}, {}, {}
+    counts, attitude, images, flow, solve, warp = {}, {}, {}, {}, {}, {}
     for tree in trees:
         image = os.path.join(tree.path, "tests", "bench", "bench_events")
         counts[tree.name], _ = count(plugin, RUN_QEMU, TARGETS[tree.name][1], image)
