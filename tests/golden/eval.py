@@ -286,6 +286,10 @@ def test_numpy():
                        for i, (a, b) in enumerate(zip(v_t, v)))
     run_name = make_run("run", [(a, *b) for a, b in zip(t, q)], velocity, span=(0.8, 11.9))
 
+    spans = np.round(rng.uniform(0.02, 0.5, len(v_t)), 6)
+    write(f"{run_name}/pairs.csv", "#t_s,interval_s,result,flow_px,n_corners,n_flow,n_inliers,saccade\n" +
+          "".join(f"{a:.6f},{b:.6f},valid,4.0,9,9,9,0\n" for i, (a, b) in enumerate(zip(v_t, spans)) if i % 3))
+
     e = evaluate(run_name, "--truth", truth, "--baseline-ms", "40")
     check("heading at rest", e["attitude"]["aligned"]["at_rest"] is True)
     compare_with_numpy(np, m, e["attitude"], t, q, ref_t, ref_q)
@@ -316,6 +320,17 @@ def test_numpy():
           f"{int((~known).sum())} without truth, {int((~fast).sum())} slow")
     check("velocity: both happen", (~known).any() and (~fast).any())
     check_stats(np, "velocity", e["velocity"]["direction"], error[fast], 1e-4)
+
+    # Against the mean over the interval of each estimate: from where it begins to where it ends.
+    first = np.round(v_t - np.floor(spans * 1e6 / 2) * 1e-6, 6)
+    chord = (position_at(np.round(first + spans, 6)) - position_at(first)) / spans[:, None]
+    chord = np.einsum("nji,nj->ni", m.matrix(orientation), chord)
+    told = known.copy()
+    told[known] = fast
+    told &= np.isfinite(chord[:, 0]) & (np.arange(len(v_t)) % 3 > 0)
+    both = (v * chord).sum(axis=1) / (np.linalg.norm(v, axis=1) * np.linalg.norm(chord, axis=1))
+    check_stats(np, "velocity over the interval", e["velocity"]["direction_over_interval"],
+                np.degrees(np.arccos(np.clip(both[told], -1, 1))), 1e-4)
 
     # Uncertainty and coverage: the sigmas of the rows cycle through three values.
     sigma = np.array([1.0, 60.0, 130.0])[np.arange(len(v_t)) % 3][known][fast]
