@@ -231,8 +231,9 @@ def test_replay():
     expect("clocks that do not meet", ["replay", recording("apart", imu_txt=imu(t0=500)), "-o", "out/apart"], 0, "have no orientation", n_lines=1)
 
 
-def flight_events(n=60000, seconds=0.6):
-    """Points on a wall that comes nearer: the flow spreads from the middle. Deterministic, and nothing turns."""
+def flight_events(n=60000, seconds=0.6, speed=0.5, slow_from=9.0):
+    """Points on a wall that comes nearer: the flow spreads from the middle. Deterministic, and nothing turns. From a time
+    on it comes ten times slower."""
     state = 1
     points = []
     for _ in range(120):
@@ -245,7 +246,7 @@ def flight_events(n=60000, seconds=0.6):
         state = state * 1103515245 + 12345 & 0x7fffffff
         x, y = points[(state >> 8) % len(points)]
         t = i / n * seconds
-        scale = 200 / (1 - 0.5 * t)
+        scale = 200 / (1 - speed * (min(t, slow_from) + 0.1 * max(0.0, t - slow_from)))
         u, v = round(x * scale + 120 + (state >> 20 & 1)), round(y * scale + 90 + (state >> 21 & 1))
         if 0 <= u < 240 and 0 <= v < 180:
             rows.append(f"{1 + t:.6f} {u} {v} {i & 1}\n")
@@ -304,6 +305,19 @@ def test_velocity():
     expect("windows too long", ["replay", "flight", "-o", "out/long_w", "--window", "time:150000"], 0, "windows last up to 150 ms")
     check("are no matter otherwise", "last up to" not in expect("no velocity", ["replay", "flight", "-o", "out/long_w", "--window", "time:150000",
                                                                               "--velocity", "off"], 0).stderr)
+    # Slower flow needs longer intervals, whose middles run back: the rows are in order all the same.
+    recording("slower", events_txt=flight_events(120000, 0.8, 0.8, 0.3), imu_txt=None, groundtruth_txt=still, calib_txt=straight)
+    expect("slower", ["replay", "slower", "-o", "out/slower", "-q", "--no-report", "--window", "area:34x26:504:5-50"], 0)
+    slower = [[float(row.split(",")[k]) for k in (0, 1)] for row in (ROOT / "out/slower/pairs.csv").read_text().splitlines()[1:]]
+    newest = [t + span / 2 for t, span in slower]
+    check("a newer pair can belong to an earlier time", any(a > b + 1e-4 for a, b in zip(newest, newest[1:])), slower)
+    check("and stands before the other", all(a[0] < b[0] for a, b in zip(slower, slower[1:])), slower)
+
+    # The report's truth is by the same clock as the attitude.
+    recording("late_poses", events_txt=flight_events(), imu_txt=None, calib_txt=straight,
+              groundtruth_txt="".join(f"{float(row.split(' ', 1)[0]) - 5:.6f} {row.split(' ', 1)[1]}\n" for row in still.splitlines()))
+    expect("poses 5 s late", ["replay", "late_poses", "-o", "out/late_poses", "--imu-offset-us", "5000000"], 0, ">median angle to the truth")
+
     kinds = {}
     for words in (["--image", "surface"], ["--image", "count"], ["--warp", "predicted"], ["--warp", "global"], ["--warp", "tiled"], ["--baseline-ms", "20:40"], ["--rotation", "window"]):
         key = " ".join(words)
