@@ -91,7 +91,7 @@ void evt_imaging_paper(evs_pipeline_config_t *p)
     p->warp = EVS_PIPELINE_WARP_TILED;
     p->iwe.vote = EVS_IWE_GAUSSIAN;
     p->iwe.smooth = false; /* The Gaussian is smooth. */
-    (void)p;
+    p->velocity.egomotion.method = EVS_EGOMOTION_PAPER;
 }
 
 /* What the option says, else the parameter file, else what stands. Both were checked when they were read. */

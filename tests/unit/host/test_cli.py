@@ -306,8 +306,8 @@ def test_velocity():
     check("are no matter otherwise", "last up to" not in expect("no velocity", ["replay", "flight", "-o", "out/long_w", "--window", "time:150000",
                                                                               "--velocity", "off"], 0).stderr)
     # Slower flow needs longer intervals, whose middles run back: the rows are in order all the same.
-    recording("slower", events_txt=flight_events(120000, 0.8, 0.8, 0.3), imu_txt=None, groundtruth_txt=still, calib_txt=straight)
-    expect("slower", ["replay", "slower", "-o", "out/slower", "-q", "--no-report", "--window", "area:34x26:504:5-50"], 0)
+    recording("slower", events_txt=flight_events(120000, 0.8, 1.2, 0.2), imu_txt=None, groundtruth_txt=still, calib_txt=straight)
+    expect("slower", ["replay", "slower", "-o", "out/slower", "-q", "--no-report", "--window", "time:12000"], 0)
     slower = [[float(row.split(",")[k]) for k in (0, 1)] for row in (ROOT / "out/slower/pairs.csv").read_text().splitlines()[1:]]
     newest = [t + span / 2 for t, span in slower]
     check("a newer pair can belong to an earlier time", any(a > b + 1e-4 for a, b in zip(newest, newest[1:])), slower)
@@ -319,7 +319,8 @@ def test_velocity():
     expect("poses 5 s late", ["replay", "late_poses", "-o", "out/late_poses", "--imu-offset-us", "5000000"], 0, ">median angle to the truth")
 
     kinds = {}
-    for words in (["--image", "surface"], ["--image", "count"], ["--warp", "predicted"], ["--warp", "global"], ["--warp", "tiled"], ["--baseline-ms", "20:40"], ["--rotation", "window"]):
+    for words in (["--image", "surface"], ["--image", "count"], ["--warp", "predicted"], ["--warp", "global"], ["--warp", "tiled"],
+                  ["--method", "erlv-paper"], ["--method", "erl"], ["--baseline-ms", "20:40"], ["--rotation", "window"]):
         key = " ".join(words)
         expect(key, ["replay", "flight", "-o", "out/k", "-q", "--no-report", *words], 0)
         option = words[0][2:]
@@ -334,14 +335,14 @@ def test_velocity():
     check("but for those that cannot", all(kinds[k] == base for k in same), same)
     expect("paper", ["replay", "flight", "-o", "out/paper", "-q", "--no-report", "--paper"], 0)
     p = summary("out/paper")["settings"]
-    check("paper", (p["warp"], p["image"], p["window_min_us"], p["window_max_us"]) == ("tiled", "iwe", 0, None), p)
+    check("paper", (p["warp"], p["method"], p["image"], p["window_min_us"], p["window_max_us"]) == ("tiled", "erlv-paper", "iwe", 0, None), p)
     expect("paper, but", ["replay", "flight", "-o", "out/paper", "-q", "--no-report", "--paper", "--warp", "none", "--image", "surface"], 0)
     p = summary("out/paper")["settings"]
-    check("options count more", (p["warp"], p["image"]) == ("none", "surface"), p)
-    write("images.yaml", "image: surface\nvelocity: True\n")
-    expect("parameter file", ["replay", "flight", "-o", "out/y2", "-q", "--no-report", "--config", "images.yaml"], 0)
+    check("options count more", (p["warp"], p["method"], p["image"]) == ("none", "erlv-paper", "surface"), p)
+    write("images.yaml", "image: surface\nvelocity: True\nmethod: erlv-paper\n")
+    expect("parameter file", ["replay", "flight", "-o", "out/y2", "-q", "--no-report", "--config", "images.yaml", "--method", "erl"], 0)
     p = summary("out/y2")["settings"]
-    check("parameter file, and an option over it", (p["image"], p["velocity"]) == ("surface", "on"), p)
+    check("parameter file, and an option over it", (p["image"], p["method"], p["velocity"]) == ("surface", "erl", "on"), p)
 
     folder = ["replay", "flight", "-o", "out/refused"]
     expect("a warp of a surface", [*folder, "--image", "surface", "--warp", "tiled"], 2, "--warp is 'tiled'", "--image surface", n_lines=1)
