@@ -181,8 +181,12 @@ static const char *result_name(const evs_velocity_result_t *pair)
     if (is_good(pair)) { return "valid"; }
     if ((pair->flags & EVS_VELOCITY_FEW) != 0u) { return "few"; }
     if ((pair->flags & EVS_VELOCITY_STILL) != 0u) { return "still"; }
-    if ((pair->flags & EVS_VELOCITY_UNSOLVED) != 0u) { return "unsolved"; }
-    return "no_orientation";
+    if ((pair->flags & EVS_VELOCITY_UNSOLVED) == 0u) { return "no_orientation"; }
+    if ((pair->solution.flags & EVS_EGOMOTION_CHANCE) != 0u) { return "chance"; }
+    if ((pair->solution.flags & EVS_EGOMOTION_ROTATION) != 0u) { return "rotation"; }
+    if ((pair->solution.flags & EVS_EGOMOTION_SIGN_UNSURE) != 0u) { return "sign_unsure"; }
+    if ((pair->solution.flags & EVS_EGOMOTION_DEGENERATE) != 0u) { return "degenerate"; }
+    return "unsolved";
 }
 
 static void count(evt_replay_velocity_counts_t *c, const evs_velocity_result_t *pair)
