@@ -429,9 +429,17 @@ static bool pull_end(evs_pipeline_t *p, evs_pipeline_chunk_t *chunk)
 static size_t count_in_slice(const evs_pipeline_t *p, const evs_event_t *ev, size_t n)
 {
     if (ev[n - 1u].t_us - p->slice_first_us < p->slice_us) { return n; }
-    size_t k = 1u;
-    while (ev[k].t_us - p->slice_first_us < p->slice_us) { k++; }
-    return k;
+    size_t in = 0u; /* belongs to the slice, as all before it do */
+    size_t out = n - 1u;
+    while (out - in > 1u) {
+        const size_t middle = in + (out - in) / 2u;
+        if (ev[middle].t_us - p->slice_first_us < p->slice_us) {
+            in = middle;
+        } else {
+            out = middle;
+        }
+    }
+    return out;
 }
 
 static void rotate(evs_pipeline_t *p, const evs_point_t *in, size_t n, evs_point_t *out)

@@ -7,12 +7,13 @@
  */
 #include "bench_markers.h"
 #include "bench_regions.h"
+#include "bench_texture.h"
 
 #include "board.h"
 #include "evs/corners.h"
 #include "evs/flow.h"
 
-enum { W = 240, H = 180, CELL = 16, LEVELS = 2, LATTICE = 9 };
+enum { W = 240, H = 180, CELL = 16, LEVELS = 2 };
 
 static uint8_t px[2][W * H];
 static uint8_t levels[2][EVS_PYRAMID_BYTES(W, H, LEVELS)];
@@ -21,29 +22,12 @@ static uint32_t flow_memory[(EVS_FLOW_BYTES(31, 2) + 3u) / 4u];
 static evs_corner_t found[BENCH_TRACKS];
 static evs_flow_track_t tracks[BENCH_TRACKS];
 
-static uint32_t hash(uint32_t x, uint32_t y)
-{
-    uint32_t h = x * 0x9E3779B1u ^ y * 0x85EBCA77u;
-    h ^= h >> 15;
-    h *= 0x2C1B3C6Du;
-    return h ^ (h >> 13);
-}
-
-/* Grey of a lattice of random values, interpolated; positions in 1/256 px. */
-static uint32_t grey_at(uint32_t x_q8, uint32_t y_q8)
-{
-    const uint32_t u = x_q8 / LATTICE, v = y_q8 / LATTICE;
-    const uint32_t i = u >> 8, j = v >> 8, fx = u & 255u, fy = v & 255u;
-    const uint32_t above = (hash(i, j) & 255u) * (256u - fx) + (hash(i + 1u, j) & 255u) * fx;
-    const uint32_t below = (hash(i, j + 1u) & 255u) * (256u - fx) + (hash(i + 1u, j + 1u) & 255u) * fx;
-    return (above * (256u - fy) + below * fy) >> 16;
-}
-
 static void render(uint8_t *out, uint32_t x_q8, uint32_t y_q8, uint32_t noise)
 {
     for (uint32_t y = 0u; y < H; y++) {
         for (uint32_t x = 0u; x < W; x++) {
-            const uint32_t grey = grey_at(256u * x + x_q8, 256u * y + y_q8) + (hash(x + noise, y) >> 16) % 8u;
+            const uint32_t grey =
+                texture_at(256u * x + x_q8, 256u * y + y_q8) + (texture_hash(x + noise, y) >> 16) % 8u;
             out[y * W + x] = (uint8_t)((grey > 255u) ? 255u : grey);
         }
     }

@@ -62,6 +62,14 @@ enum {
     BENCH_IMAGE_PAIR = 2,
 };
 
+/* bench_velocity.c */
+enum { BENCH_DIRECTION_TRACKS = 180 };
+
+enum {
+    BENCH_DIRECTION = 0,
+    BENCH_TURN = 1,
+};
+
 /* bench_egomotion.c */
 enum { BENCH_SOLVES = 8 };
 

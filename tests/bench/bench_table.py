@@ -72,6 +72,10 @@ PER_IMAGE = [  # (row, region, how many there are in it)
     ("flow: a corner tracked, 31 px, every 2nd, 2 levels, there and back", "TRACK_ALL", "TRACKS"),
     ("**image pair: corners, half, 128 tracks**", "IMAGE_PAIR", "ONE"),
 ]
+PER_DIRECTION = [
+    ("**direction of flight from an image and a keyframe: corners, pyramids, 180 tracks, solution**", "DIRECTION"),
+    ("a keyframe turned after a saccade", "TURN"),
+]
 PER_SOLVE = [
     ("**direction of velocity from 500 vectors**", "SOLVE_500"),
     ("the same from 100", "SOLVE_100"),
@@ -93,7 +97,7 @@ def table(head, rows):
 
 def generate(trees, plugin):
     number = constants()
-    counts, attitude, images, flow, solve, warp = {}, {}, {}, {}, {}, {}
+    counts, attitude, images, flow, solve, warp, velocity = {}, {}, {}, {}, {}, {}, {}
     for tree in trees:
         image = os.path.join(tree.path, "tests", "bench", "bench_events")
         counts[tree.name], _ = count(plugin, RUN_QEMU, TARGETS[tree.name][1], image)
@@ -107,6 +111,8 @@ def generate(trees, plugin):
         solve[tree.name], _ = count(plugin, RUN_QEMU, TARGETS[tree.name][1], image)
         image = os.path.join(tree.path, "tests", "bench", "bench_warp")
         warp[tree.name], _ = count(plugin, RUN_QEMU, TARGETS[tree.name][1], image)
+        image = os.path.join(tree.path, "tests", "bench", "bench_velocity")
+        velocity[tree.name], _ = count(plugin, RUN_QEMU, TARGETS[tree.name][1], image)
 
     def per_call(name, tree, counts=counts, expected=number["BATCHES"]):
         calls, insns = counts[tree.name][number[name]]
@@ -135,6 +141,7 @@ def generate(trees, plugin):
     number["ONE"] = 1
     rows += [[row] + [f"{per_call(region, t, flow, 1) / number[n]:.0f}" for t in trees] for row, region, n in PER_IMAGE]
     rows += [[row] + [f"{per_call(region, t, solve, number['SOLVES']):.0f}" for t in trees] for row, region in PER_SOLVE]
+    rows += [[row] + [f"{per_call(region, t, velocity, 1):.0f}" for t in trees] for row, region in PER_DIRECTION]
     return out + "\nInstructions per call:\n\n" + table(["step"] + names, rows)
 
 

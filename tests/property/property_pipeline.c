@@ -1,13 +1,20 @@
 /* SPDX-License-Identifier: MIT
  * SPDX-FileCopyrightText: 2026 the evstab authors */
-/* Whatever is pushed, in whatever order: every accepted event comes out once, in order, in a window that adds up. */
+/* Whatever is pushed, in whatever order: every accepted event comes out once, in order, in a window that adds up; every
+ * window gives an image or is counted; a direction that is said to be valid is a direction. */
 #include "evs/pipeline.h"
 #include "unity.h"
 
 enum { W = 40, H = 30, N_FIFO = 64, N_RING = 4, N_BATCH = 16, N_RUNS = 60, N_STEPS = 400 };
 
 static evs_pipeline_t p;
-static uint64_t memory[EVS_PIPELINE_BYTES(W, H, 4, true, 20, N_FIFO, N_RING, N_BATCH) / 8u];
+enum { N_KEPT = 200, N_BUDGET = 100 };
+static uint64_t memory[(EVS_PIPELINE_BYTES(W, H, 4, true, 20, N_FIFO, N_RING, N_BATCH) +
+                        EVS_PIPELINE_IMAGE_BYTES(W, H, EVS_PIPELINE_IMAGE_SURFACE, EVS_IWE_GAUSSIAN,
+                                                 EVS_PIPELINE_WARP_PREDICTED, true, N_BATCH) +
+                        EVS_PIPELINE_WARP_BYTES(W, H, N_KEPT, N_BUDGET, 16u, 1u) +
+                        EVS_VELOCITY_BYTES(W, H, 4u, 4u, 0u, 4u, 31u, 1u, 64u)) /
+                       8u];
 static uint64_t state;
 
 void setUp(void) {}
@@ -61,6 +68,32 @@ static uint32_t step_time(uint32_t t_us)
     }
 }
 
+/* Images of any kind, and small pieces to track in them. */
+static void ask_for_images(evs_pipeline_config_t *cfg)
+{
+    cfg->image = (evs_pipeline_image_t)below(4u);
+    cfg->iwe.vote = (evs_iwe_vote_t)below(3u);
+    if (cfg->image == EVS_PIPELINE_IMAGE_NONE) { return; }
+    cfg->velocity_on = below(4u) != 0u;
+    cfg->velocity.keyframes.n_stored = (uint16_t)(1u + below(EVS_KEYFRAMES_MAX));
+    cfg->velocity.keyframes.baseline_min_us = 1u + below(10000u);
+    cfg->velocity.corners.cell_px = (uint16_t)(4u + below(8u));
+    cfg->velocity.flow.window_px = (uint16_t)(7u + 2u * below(13u));
+    cfg->velocity.flow.stride_px = (uint16_t)(1u + below(2u));
+    cfg->velocity.n_levels = (uint16_t)(1u + below(EVS_FLOW_LEVELS_MAX));
+    cfg->velocity.egomotion.method = (evs_egomotion_method_t)below(3u);
+    cfg->velocity.egomotion.rotation_sigma_rad_q28 = (int32_t)below(1u << 24);
+    cfg->velocity.min_features = (uint16_t)(1u + below(20u));
+    if (cfg->image == EVS_PIPELINE_IMAGE_SURFACE) { return; }
+    cfg->warp = (evs_pipeline_warp_t)below(4u);
+    if ((cfg->warp == EVS_PIPELINE_WARP_PREDICTED) && !cfg->velocity_on) { cfg->warp = EVS_PIPELINE_WARP_NONE; }
+    cfg->warp_search.n_budget = N_BUDGET;
+    cfg->warp_search.n_cols = 4u;
+    cfg->warp_search.n_rows = 3u;
+    cfg->warp_search.n_min = 5u;
+    cfg->n_warp_events = N_KEPT;
+}
+
 static evs_pipeline_config_t any_config(void)
 {
     evs_camera_config_t camera = evs_camera_config_ideal(W, H, (int32_t)((20u + below(60u)) << 16));
@@ -84,12 +117,17 @@ static evs_pipeline_config_t any_config(void)
     cfg.stabilize.saccade_px_q4 = (uint16_t)below(200u);
     cfg.attitude.mode = (evs_attitude_mode_t)below(3u);
     cfg.max_wait_us = below(5000u);
+    ask_for_images(&cfg);
     return cfg;
 }
 
 static uint32_t n_given;
 static uint32_t n_backwards;
 static uint32_t n_in_window;
+static uint32_t n_windows;
+static uint32_t n_images;
+static uint32_t n_results; /* in all runs, and valid ones */
+static uint32_t n_valid;
 static uint32_t last_t_us;
 static bool have_last;
 
@@ -110,7 +148,34 @@ static void take(const evs_pipeline_chunk_t *c)
         TEST_ASSERT_EQUAL_UINT32(n_in_window, c->end.n_events);
         TEST_ASSERT_EQUAL_UINT32(c->window, c->end.index);
         n_in_window = 0u;
+        n_windows++;
+        n_images += (c->image.px != NULL) ? 1u : 0u;
+    } else {
+        TEST_ASSERT_NULL(c->image.px);
     }
+}
+
+static void assert_unit(evs_vec3_t v)
+{
+    TEST_ASSERT_INT64_WITHIN(INT64_C(1) << 36, INT64_C(1) << 60, (int64_t)evs_vec3_norm_sq(v));
+}
+
+static void work(const evs_pipeline_config_t *cfg)
+{
+    evs_velocity_result_t r;
+    if (!evs_pipeline_velocity(&p, 1u + below(50u), &r)) { return; }
+    TEST_ASSERT_TRUE(cfg->velocity_on);
+    n_results++;
+    TEST_ASSERT_TRUE(r.n_flow <= r.n_corners);
+    const uint32_t bad = EVS_VELOCITY_FEW | EVS_VELOCITY_STILL | EVS_VELOCITY_UNSOLVED | EVS_VELOCITY_UNLIKE;
+    TEST_ASSERT_TRUE(((r.flags & EVS_VELOCITY_VALID) != 0u) == ((r.flags & bad) == 0u));
+    TEST_ASSERT_TRUE((r.interval_us >= cfg->velocity.keyframes.baseline_min_us / 2u) &&
+                     (r.interval_us <= cfg->velocity.keyframes.age_max_us));
+    if ((r.flags & EVS_VELOCITY_VALID) == 0u) { return; }
+    n_valid++;
+    TEST_ASSERT_TRUE(r.n_flow >= cfg->velocity.min_features);
+    assert_unit(r.v_r_q30);
+    if ((r.flags & EVS_VELOCITY_NO_ORIENTATION) == 0u) { assert_unit(r.v_c_q30); }
 }
 
 static void pull_all(void)
@@ -151,6 +216,8 @@ static void test_nothing_is_lost_or_given_twice_whatever_is_pushed(void)
         n_given = 0u;
         n_backwards = 0u;
         n_in_window = 0u;
+        n_windows = 0u;
+        n_images = 0u;
         have_last = false;
         uint32_t t_us = next_u32();
         for (int step = 0; step < N_STEPS; step++) {
@@ -170,6 +237,7 @@ static void test_nothing_is_lost_or_given_twice_whatever_is_pushed(void)
                 TEST_ASSERT_EQUAL_UINT_MESSAGE(8u, done, "locked up");
             }
             if (below(3u) == 0u) { pull_all(); }
+            if (below(2u) == 0u) { work(&cfg); }
         }
         evs_pipeline_finish(&p);
         pull_all();
@@ -177,7 +245,13 @@ static void test_nothing_is_lost_or_given_twice_whatever_is_pushed(void)
         TEST_ASSERT_EQUAL_UINT32(counts.n_events, n_given);
         TEST_ASSERT_TRUE_MESSAGE(n_backwards <= counts.n_restarts, "out of order");
         TEST_ASSERT_EQUAL_UINT32_MESSAGE(0u, n_in_window, "a window was left open");
+        TEST_ASSERT_EQUAL_UINT32(counts.n_images, n_images);
+        if (cfg.image != EVS_PIPELINE_IMAGE_NONE) {
+            TEST_ASSERT_EQUAL_UINT32(n_windows, n_images + counts.n_images_busy + counts.n_images_incomplete);
+        }
     }
+    TEST_ASSERT_TRUE(n_results > 100u);
+    TEST_ASSERT_TRUE_MESSAGE(n_valid <= n_results / 50u, "random events have no direction");
 }
 
 int main(void)
