@@ -258,9 +258,10 @@ static void judge(evl_velocity_result_t *result, errors_t *e)
         e->error_deg.value[n_kept++] = error_deg;
         if (isfinite(interval_deg)) { e->interval_error_deg.value[n_interval++] = interval_deg; }
         if (isfinite(sigma_deg)) {
+            const double told_deg = isfinite(interval_deg) ? interval_deg : error_deg; /* What it is an estimate of. */
             result->n_sigma++;
-            result->n_within_sigma += (error_deg <= sigma_deg) ? 1u : 0u;
-            result->n_within_2_sigma += (error_deg <= 2.0 * sigma_deg) ? 1u : 0u;
+            result->n_within_sigma += (told_deg <= sigma_deg) ? 1u : 0u;
+            result->n_within_2_sigma += (told_deg <= 2.0 * sigma_deg) ? 1u : 0u;
         }
     }
     e->error_deg.n = n_kept;

@@ -70,7 +70,7 @@ typedef struct {
     double mean_speed_m_s; /**< Of the truth. */
     evl_stats_t error_deg;
     evl_stats_t interval_error_deg; /**< Against the mean over the interval, where it is told and there are poses. */
-    size_t n_sigma;                 /**< Of these errors so many have a sigma... */
+    size_t n_sigma; /**< Of these errors (over the interval, where it is told) so many have a sigma... */
     size_t n_within_sigma, n_within_2_sigma; /**< ...and are so small. */
 } evl_velocity_result_t;
 

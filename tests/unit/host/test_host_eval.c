@@ -329,7 +329,8 @@ static void test_flow_over_an_interval_is_held_to_the_mean_velocity_over_it(void
     TEST_ASSERT_FALSE(evl_velocity_over(&ref, evl_quat_identity(), 480000, 0, &v));
     TEST_ASSERT_FALSE(evl_velocity_over(&ref, evl_quat_identity(), 50000, 200000, &v));
 
-    TEST_ASSERT_TRUE(evl_velocities_read(&est, temp_text("0.30 1 0 0\n0.48 1 0 0\n0.60 1 0 0\n"), &err));
+    TEST_ASSERT_TRUE(evl_velocities_read(
+        &est, temp_text("#t_s,vx,vy,vz,sigma_deg\n0.30,1,0,0,1\n0.48,1,0,0,25\n0.60,1,0,0,20\n"), &err));
     temp_file_remove();
     TEST_ASSERT_TRUE(evl_velocities_read_intervals(&est,
                                                    temp_text("#t_s,interval_s,result,flow_px\n0.10,0.07,few,0\n"
@@ -346,6 +347,9 @@ static void test_flow_over_an_interval_is_held_to_the_mean_velocity_over_it(void
     TEST_ASSERT_EQUAL_UINT(3u, r.error_deg.n);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 30.0, r.error_deg.mean); /* 0, 0, 90 */
     TEST_ASSERT_EQUAL_UINT(2u, r.interval_error_deg.n);
+    TEST_ASSERT_EQUAL_UINT(3u, r.n_sigma);
+    TEST_ASSERT_EQUAL_UINT(1u, r.n_within_sigma);   /* 0 of 1 */
+    TEST_ASSERT_EQUAL_UINT(2u, r.n_within_2_sigma); /* and 33.7 of 25, over its interval; 90 of 20 is not */
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.5 * (EVL_DEG_PER_RAD * atan2(2.0, 3.0) + 90.0), r.interval_error_deg.mean);
     evl_velocities_free(&est);
 }
