@@ -65,9 +65,38 @@ static bool is_near_line(const ego_view_t *w, uint32_t limit)
     return (uint64_t)((int64_t)w->c * w->c) <= (uint64_t)w->a2 * (limit * limit);
 }
 
-/* Count the vectors that agree, and ask whether they are enough, more than chance would give, and of one sign. */
-static void judge_count(const ego_set_t *set, evs_egomotion_result_t *result)
+/* Vectors by cells of the image. */
+typedef struct {
+    uint16_t n_all[EGO_CELLS];
+    uint16_t n_good[EGO_CELLS];
+} cells_t;
+
+/* Whether the outliers come in patches, as those of an object that moves by itself do, and not evenly: chi^2 per degree of
+ * freedom, at least 1. */
+static evs_scaled_t patchiness(const cells_t *cells, uint32_t n_all, uint32_t n_good)
 {
+    const int64_t n = n_all;
+    const int64_t good = n_good;
+    evs_scaled_t sum = evs_scaled(0, 0);
+    int32_t n_used = 0;
+    for (unsigned c = 0u; c < EGO_CELLS; c++) {
+        if (cells->n_all[c] == 0u) { continue; }
+        const evs_scaled_t off = evs_scaled(cells->n_good[c] * n - cells->n_all[c] * good, 0);
+        const evs_scaled_t variance = evs_scaled(cells->n_all[c] * good * (n - good) + n * n / 4 + 1, 0);
+        sum = evs_scaled_add(sum, evs_scaled_div(evs_scaled_mul(off, off), variance));
+        n_used++;
+    }
+    const evs_scaled_t one = evs_scaled(1, 0);
+    if (n_used < 2) { return one; }
+    const evs_scaled_t per_degree = evs_scaled_div(sum, evs_scaled(n_used - 1, 0));
+    return evs_scaled_less(per_degree, one) ? one : per_degree;
+}
+
+/* Count the vectors that agree, and ask whether they are enough, more than chance would give, and of one sign.
+ * Returns the patchiness of the others. */
+static evs_scaled_t judge_count(const ego_set_t *set, evs_egomotion_result_t *result)
+{
+    cells_t cells = {{0}, {0}};
     const ego_dir_t dir = ego_dir(set, result->v_q30);
     const uint32_t limit = result->inlier_limit_;
     uint64_t chance_q16 = 0u;
@@ -75,7 +104,10 @@ static void judge_count(const ego_set_t *set, evs_egomotion_result_t *result)
     for (uint32_t i = 0u; i < set->n; i++) {
         const ego_view_t w = ego_view(&set->vec[i], dir);
         chance_q16 += by_chance_q16(about_length(&set->vec[i]), limit);
+        const uint32_t cell = ego_cell(set, &set->vec[i]);
+        cells.n_all[cell]++;
         if (!is_near_line(&w, limit)) { continue; }
+        cells.n_good[cell] = (uint16_t)(cells.n_good[cell] + ((w.d > 0) ? 1u : 0u));
         result->n_inliers += (w.d > 0) ? 1u : 0u;
         n_against += (w.d < 0) ? 1u : 0u;
     }
@@ -86,6 +118,7 @@ static void judge_count(const ego_set_t *set, evs_egomotion_result_t *result)
     if ((lead <= 0) || (lead * lead <= 9 * ((int64_t)result->n_inliers + n_against))) {
         result->flags |= EVS_EGOMOTION_SIGN_UNSURE;
     }
+    return patchiness(&cells, set->n, result->n_inliers);
 }
 
 bool evs_egomotion_is_inlier(const evs_egomotion_result_t *result, const evs_egomotion_flow_t *flow)
@@ -98,24 +131,36 @@ bool evs_egomotion_is_inlier(const evs_egomotion_result_t *result, const evs_ego
     return (w.d > 0) && is_near_line(&w, result->inlier_limit_);
 }
 
-/* Noise in steps, and the judgement of the vectors under it. */
-static uint32_t judge(const ego_set_t *set, evs_egomotion_result_t *result)
+/* What is judged of an estimate. */
+typedef struct {
+    uint32_t noise; /* steps */
+    evs_scaled_t patchiness;
+} judgement_t;
+
+static judgement_t judge(const ego_set_t *set, evs_egomotion_result_t *result)
 {
-    const uint32_t noise = ego_noise(set, result->v_q30, NOISE_VECTORS);
-    result->noise_q24 = ego_steps_to_q24(result, noise);
-    result->inlier_limit_ = (uint16_t)evs_clamp((int32_t)(noise * 5u / 2u), INLIER_LIMIT_MIN, 2 * EGO_CLIP);
-    judge_count(set, result);
-    return noise;
+    judgement_t j;
+    j.noise = ego_noise(set, result->v_q30, NOISE_VECTORS);
+    result->noise_q24 = ego_steps_to_q24(result, j.noise);
+    result->inlier_limit_ = (uint16_t)evs_clamp((int32_t)(j.noise * 5u / 2u), INLIER_LIMIT_MIN, 2 * EGO_CLIP);
+    j.patchiness = judge_count(set, result);
+    return j;
 }
 
 /* Covariance of the tangent plane in rad^2, or NULL for none, to the camera's axes, and sigma. */
-static void put_spread(const evs_egomotion_config_t *cfg, evs_scaled_t *cov, evs_egomotion_result_t *result)
+static void put_spread(const evs_egomotion_config_t *cfg, const judgement_t *judgement, evs_scaled_t *cov,
+                       evs_egomotion_result_t *result)
 {
     if (cov == NULL) {
         result->flags |= EVS_EGOMOTION_DEGENERATE;
         return;
     }
-    for (unsigned i = 0u; i < 3u; i++) { cov[i] = evs_scaled_mul(cov[i], evs_scaled(cfg->variance_factor_q8, -8)); }
+    /* few vectors fit themselves better than they fit the truth; and where outliers come in patches, more of the same are
+     * likely among the good ones: the root is between ignoring that and believing it of all */
+    const int64_t n = (result->n_inliers > 5u) ? result->n_inliers : 5;
+    const evs_scaled_t few = evs_scaled_div(evs_scaled(n * cfg->variance_factor_q8, -8), evs_scaled(n - 4, 0));
+    const evs_scaled_t factor = evs_scaled_mul(few, evs_scaled_sqrt(judgement->patchiness));
+    for (unsigned i = 0u; i < 3u; i++) { cov[i] = evs_scaled_mul(cov[i], factor); }
     const ego_frame_t f = ego_frame(result->v_q30);
     const evs_scaled_t sigma = evs_scaled_sqrt(evs_scaled_add(cov[0], cov[2]));
     const int32_t sigma_q28 = evs_scaled_to_q(sigma, 28);
@@ -184,19 +229,20 @@ static void solve_robust(const evs_egomotion_config_t *cfg, const ego_call_t *ca
     if (with_rotation) {
         s = refine_rotation(cfg, call, &v, &rot, result);
     } else {
+        const uint32_t fewer = (set->n + NOISE_VECTORS - 1u) / NOISE_VECTORS;
         for (int i = 0; i < NARROW_STEPS; i++) {
             if ((i & 1) == 0) { s = kernel_scale(ego_noise(set, v, NOISE_VECTORS)); }
-            (void)ego_step(set, s, 1u, &v);
+            (void)ego_step(set, s, (i < 2) ? fewer : 1u, &v); /* what the later ones correct costs half */
         }
     }
     result->v_q30 = v;
-    const uint32_t noise = judge(set, result);
+    const judgement_t j = judge(set, result);
     if (ego_is_rotation(set, v, s)) { result->flags |= EVS_EGOMOTION_ROTATION; }
     const ego_frame_t f = ego_frame(v);
     evs_scaled_t cov[3];
     const bool definite =
-        with_rotation ? ego_covariance_rotation(set, &f, s, noise, rot.prior, cov) : ego_covariance(set, &f, s, cov);
-    put_spread(cfg, definite ? cov : NULL, result);
+        with_rotation ? ego_covariance_rotation(set, &f, s, j.noise, rot.prior, cov) : ego_covariance(set, &f, s, cov);
+    put_spread(cfg, &j, definite ? cov : NULL, result);
 }
 
 /* --- the published estimates ------------------------------------------------------------------------------------ */
@@ -208,9 +254,11 @@ static void solve_paper(const evs_egomotion_config_t *cfg, const ego_call_t *cal
     evs_scaled_t cov[3];
     const bool definite = ego_paper(set, joint, call->likelihood, result, cov);
     ego_repack(set, call->flow, call->n, result);
-    const uint32_t noise = judge(set, result);
-    if (!joint && ego_is_rotation(set, result->v_q30, kernel_scale(noise))) { result->flags |= EVS_EGOMOTION_ROTATION; }
-    put_spread(cfg, definite ? cov : NULL, result);
+    const judgement_t j = judge(set, result);
+    if (!joint && ego_is_rotation(set, result->v_q30, kernel_scale(j.noise))) {
+        result->flags |= EVS_EGOMOTION_ROTATION;
+    }
+    put_spread(cfg, &j, definite ? cov : NULL, result);
 }
 
 /* --- the call --------------------------------------------------------------------------------------------------- */

@@ -13,9 +13,9 @@ enum {
     N_TRIANGLE = DIM * (DIM + 1) / 2,
     GRID_COARSE = 11, /* azimuths and radii; the first and the last azimuth are the same, and count twice */
     GRID_FINE = 25,
-    DOWNHILL_STEPS = 20,
-    HALVINGS = 6,
-    SLOPE_MAX = 1 << 18
+    FINEST = 1 << 15, /* last step downhill, Q30: 3e-5 rad */
+    HALVINGS = 10,    /* from the first, 2 degrees */
+    SLOPE_MAX = (1 << 18) - 1
 };
 
 /* What the estimators share. */
@@ -190,12 +190,37 @@ static evs_vec3_t search_grid(const paper_t *e, uint64_t *least)
     return best;
 }
 
-/* --- downhill --------------------------------------------------------------------------------------------------- */
+/* The nearest local minimum, by steps in eight directions that are halved when none leads down: needs no derivative, whose
+ * approximation by least squares misleads when many vectors are outliers. */
+static evs_vec3_t downhill(const paper_t *e, evs_vec3_t v, uint64_t least)
+{
+    for (int32_t reach = 2 * FINEST << HALVINGS; reach > FINEST;) {
+        const ego_frame_t f = ego_frame(v);
+        bool lower = false;
+        for (uint32_t k = 0u; (k < 8u) && !lower; k++) {
+            int32_t sin_q30;
+            int32_t cos_q30;
+            ego_turn_t turn;
+            evs_sincos((int32_t)(k << 29), &sin_q30, &cos_q30);
+            const evs_vec3_t next = ego_move(&f, evs_scaled(evs_q_mul(cos_q30, reach, 30u), -30),
+                                             evs_scaled(evs_q_mul(sin_q30, reach, 30u), -30));
+            const uint64_t here = cost(e, next, &turn);
+            lower = here < least;
+            if (lower) {
+                v = next;
+                least = here;
+            }
+        }
+        if (!lower) { reach /= 2; }
+    }
+    return v;
+}
+
+/* --- spread ----------------------------------------------------------------------------------------------------- */
 
 typedef struct {
-    int64_t h[N_TRIANGLE]; /* sum of w^2 J J' */
-    int64_t g_q2[DIM];     /* sum of w^2 r J */
-    int64_t z[EGO_CELLS][DIM];
+    int64_t h[N_TRIANGLE];     /* sum of w^2 J J' */
+    int64_t z[EGO_CELLS][DIM]; /* sum of w^2 r J by cells */
 } sums_t;
 
 static void add_up(const paper_t *e, const ego_frame_t *f, const ego_turn_t *turn, sums_t *sums)
@@ -223,44 +248,10 @@ static void add_up(const paper_t *e, const ego_frame_t *f, const ego_turn_t *tur
         unsigned at = 0u;
         for (unsigned k = 0u; k < DIM; k++) {
             const int32_t wj = ego_weigh(weight_q30, inv, j[k]);
-            sums->g_q2[k] += (int64_t)wr_q2 * j[k];
             sums->z[ego_cell(set, &p)][k] += ego_gradient(wr_q2, j[k]);
             for (unsigned l = 0u; l <= k; l++) { sums->h[at++] += (int64_t)wj * j[l]; }
         }
     }
-}
-
-static evs_vec3_t downhill(const paper_t *e, evs_vec3_t v, uint64_t least)
-{
-    const unsigned dim = e->joint ? 5u : 2u;
-    ego_turn_t turn;
-    (void)cost(e, v, &turn);
-    for (int i = 0; i < DOWNHILL_STEPS; i++) {
-        const ego_frame_t f = ego_frame(v);
-        sums_t sums;
-        evs_scaled_t h[N_TRIANGLE];
-        evs_scaled_t step[DIM];
-        add_up(e, &f, &turn, &sums);
-        for (unsigned k = 0u; k < N_TRIANGLE; k++) { h[k] = evs_scaled(sums.h[k], 0); }
-        for (unsigned k = 0u; k < DIM; k++) { step[k] = evs_scaled(-sums.g_q2[k], -2); }
-        if (!evs_scaled_solve(h, step, dim)) { return v; }
-        bool lower = false;
-        for (int k = 0; (k < HALVINGS) && !lower; k++) {
-            ego_turn_t there;
-            const evs_vec3_t next = ego_move(&f, step[0], step[1]);
-            const uint64_t here = cost(e, next, &there);
-            lower = here < least;
-            if (lower) {
-                v = next;
-                turn = there;
-                least = here;
-            }
-            step[0].e -= (step[0].m != 0) ? 2 : 0;
-            step[1].e -= (step[1].m != 0) ? 2 : 0;
-        }
-        if (!lower) { return v; }
-    }
-    return v;
 }
 
 /* --- the estimate ----------------------------------------------------------------------------------------------- */

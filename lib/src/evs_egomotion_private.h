@@ -159,14 +159,14 @@ static inline int32_t ego_clip16(int32_t x) { return evs_clamp(x, INT16_MIN, INT
 
 /* How a vector's residual r depends on a step (d0, d1): |a| dr = j0 d0 + j1 d1, in steps. */
 typedef struct {
-    int32_t j0; /* |j| < 2^18 */
+    int32_t j0; /* |j| < 2^18, since |rho| < 2^14 and |p| < 2^(one_bits + 3.5) */
     int32_t j1;
 } ego_slope_t;
 
 static inline ego_slope_t ego_slope(const ego_set_t *set, const ego_vector_t *p, int32_t d, uint32_t inv, ego_dir_t b0,
                                     ego_dir_t b1)
 {
-    const int32_t rho = ego_clip16(ego_over_a2_q2(set, d, inv) >> 2);
+    const int32_t rho = evs_clamp(ego_over_a2_q2(set, d, inv) >> 2, -16384, 16383);
     const int32_t p0 = (p->x * b0.x + p->y * b0.y + b0.z) >> 16;
     const int32_t p1 = (p->x * b1.x + p->y * b1.y + b1.z) >> 16;
     const ego_slope_t s = {(rho * p1) >> set->one_bits, -((rho * p0) >> set->one_bits)};
@@ -212,6 +212,9 @@ typedef struct {
     uint32_t inv;
 } ego_pull_t;
 
+/* psi' / w of a part of the Hessian. */
+static inline int32_t ego_bend(const ego_pull_t *a, int32_t k) { return evs_mul_hi(k * 8, a->bend_q15 * 16384); }
+
 /* False: the vector points the wrong way or is too close to the focus. */
 static inline bool ego_pull(const ego_set_t *set, const ego_vector_t *p, const ego_loop_t *loop, ego_pull_t *out)
 {
@@ -231,12 +234,11 @@ static inline bool ego_pull(const ego_set_t *set, const ego_vector_t *p, const e
     return true;
 }
 
-/* The gradient that a vector adds, in 4 steps^2; limited so that 2^16 of them fit 39 bits. */
+/* The gradient that a vector adds, wr_q2 * j / 16: in 4 steps^2, limited to 2^23. */
 static inline int32_t ego_gradient(int32_t wr_q2, int32_t j)
 {
-    const int64_t z = ((int64_t)wr_q2 * j) >> 4;
-    const int64_t limit = INT64_C(1) << 23;
-    return (int32_t)((z > limit) ? limit : ((z < -limit) ? -limit : z));
+    const int32_t wr = evs_clamp(wr_q2, -65536, 65535);
+    return evs_clamp(evs_mul_hi(wr * 32768, j * 8192), -(INT32_C(1) << 23), (INT32_C(1) << 23) - 1);
 }
 
 /* Flow of a unit rotation about each axis, at 1 = 2^(one_bits + 1): u = bu w, v = bv w. */

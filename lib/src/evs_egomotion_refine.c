@@ -149,29 +149,27 @@ bool ego_covariance(const ego_set_t *set, const ego_frame_t *f, uint32_t s, evs_
 {
     const ego_loop_t loop = ego_loop(set, f, s);
     int64_t h00 = 0, h01 = 0, h11 = 0;
-    int64_t curvature_q15 = 0;       /* sum of psi' |J|^2: the trace of the true Hessian */
+    int64_t curvature = 0;           /* sum of psi' |J|^2: the trace of the true Hessian */
     int64_t z[EGO_CELLS][2] = {{0}}; /* the gradient, by cells */
     uint64_t spread = 0u;            /* sum of its squares, vector by vector */
     for (uint32_t i = 0u; i < set->n; i++) {
         ego_pull_t a;
         if (!ego_pull(set, &set->vec[i], &loop, &a)) { continue; }
-        const int64_t w00 = (int64_t)a.k0 * a.j.j0;
-        const int64_t w11 = (int64_t)a.k1 * a.j.j1;
-        h00 += w00;
+        h00 += (int64_t)a.k0 * a.j.j0;
         h01 += (int64_t)a.k0 * a.j.j1;
-        h11 += w11;
-        curvature_q15 += (w00 + w11) * a.bend_q15;
-        const int64_t z0 = ego_gradient(a.wr_q2, a.j.j0);
-        const int64_t z1 = ego_gradient(a.wr_q2, a.j.j1);
+        h11 += (int64_t)a.k1 * a.j.j1;
+        curvature += (int64_t)ego_bend(&a, a.k0) * a.j.j0 + (int64_t)ego_bend(&a, a.k1) * a.j.j1;
+        const int32_t z0 = ego_gradient(a.wr_q2, a.j.j0);
+        const int32_t z1 = ego_gradient(a.wr_q2, a.j.j1);
         int64_t *const cell = z[ego_cell(set, &set->vec[i])];
         cell[0] += z0;
         cell[1] += z1;
-        spread += (uint64_t)(z0 * z0) + (uint64_t)(z1 * z1);
+        spread += (uint64_t)((int64_t)z0 * z0) + (uint64_t)((int64_t)z1 * z1);
     }
-    if (curvature_q15 <= 0) { return false; }
+    if (curvature <= 0) { return false; }
     /* cov = H^-1 M H^-1 / kappa^2, kappa being the trace of the true Hessian over that of H: the true one by itself need
      * not be positive, and its inverse would be noise. */
-    const evs_scaled_t kappa = evs_scaled_div(evs_scaled(curvature_q15, -15), evs_scaled(h00 + h11, 0));
+    const evs_scaled_t kappa = evs_scaled_div(evs_scaled(curvature, 0), evs_scaled(h00 + h11, 0));
     const evs_scaled_t h[3] = {evs_scaled_mul(evs_scaled(h00, 0), kappa), evs_scaled_mul(evs_scaled(h01, 0), kappa),
                                evs_scaled_mul(evs_scaled(h11, 0), kappa)};
     evs_scaled_t m[3];

@@ -3,7 +3,7 @@
 /* Rotation left in the flow: estimated under a prior together with v, and the question whether it is all there is. */
 #include "evs_egomotion_private.h"
 
-enum { DIM = 5, N_TRIANGLE = DIM * (DIM + 1) / 2, SLOPE_MAX = 1 << 18 };
+enum { DIM = 5, N_TRIANGLE = DIM * (DIM + 1) / 2, SLOPE_MAX = (1 << 18) - 1 };
 
 /* --- joint steps ------------------------------------------------------------------------------------------------ */
 
@@ -11,13 +11,13 @@ typedef struct {
     int64_t h[N_TRIANGLE];     /* sum of w J J' */
     int64_t g_q2[DIM];         /* sum of w r J */
     int64_t z[EGO_CELLS][DIM]; /* the same by cells, in 4 steps^2 */
-    int64_t curvature_q15;     /* sum of psi' |J|^2 over the two of v */
+    int64_t curvature;         /* sum of psi' |J|^2 over the two of v */
 } sums_t;
 
 static void add_up(const ego_set_t *set, const ego_frame_t *f, uint32_t s, sums_t *sums)
 {
     const ego_loop_t loop = ego_loop(set, f, s);
-    *sums = (sums_t){.curvature_q15 = 0};
+    *sums = (sums_t){.curvature = 0};
     for (uint32_t i = 0u; i < set->n; i++) {
         const ego_vector_t *const p = &set->vec[i];
         ego_pull_t a;
@@ -36,7 +36,7 @@ static void add_up(const ego_set_t *set, const ego_frame_t *f, uint32_t s, sums_
             cell[k] += ego_gradient(a.wr_q2, j[k]);
             sums->g_q2[k] += (int64_t)a.wr_q2 * j[k];
             for (unsigned l = 0u; l <= k; l++) { sums->h[at++] += (int64_t)wj * j[l]; }
-            if (k < 2u) { sums->curvature_q15 += (int64_t)wj * j[k] * a.bend_q15; }
+            if (k < 2u) { sums->curvature += (int64_t)ego_bend(&a, wj) * j[k]; }
         }
     }
 }
@@ -91,9 +91,8 @@ bool ego_covariance_rotation(const ego_set_t *set, const ego_frame_t *f, uint32_
     evs_scaled_t h[N_TRIANGLE];
     evs_scaled_t m[N_TRIANGLE];
     add_up(set, f, s, &sums);
-    if (sums.curvature_q15 <= 0) { return false; }
-    const evs_scaled_t kappa =
-        evs_scaled_div(evs_scaled(sums.curvature_q15, -15), evs_scaled(sums.h[0] + sums.h[2], 0));
+    if (sums.curvature <= 0) { return false; }
+    const evs_scaled_t kappa = evs_scaled_div(evs_scaled(sums.curvature, 0), evs_scaled(sums.h[0] + sums.h[2], 0));
     for (unsigned i = 0u; i < N_TRIANGLE; i++) { h[i] = evs_scaled_mul(evs_scaled(sums.h[i], 0), kappa); }
     ego_spread(&sums.z[0][0], DIM, m);
     const evs_scaled_t of_prior = evs_scaled_mul(prior, evs_scaled((int64_t)noise * noise + 1, 0));
@@ -126,13 +125,13 @@ static bool fit_turn(const ego_set_t *set, uint32_t stride, uint32_t s2, ego_tur
         ego_left_over(set, p, &r, t, left);
         const uint32_t e = (uint32_t)(left[0] * left[0]) + (uint32_t)(left[1] * left[1]);
         const uint32_t share = ratio_q15(s2, s2 + (e >> 1));
-        const int64_t weight = (share * share) >> 22; /* Q8 */
+        const int32_t weight_q8 = (int32_t)((share * share) >> 22);
         unsigned at = 0u;
-        for (unsigned k = 0u; k < 3u; k++) { /* rows up to 2^18: sums up to 2^(8 + 36 + 1 + 16) */
-            g[k] += weight * ((int64_t)r.bu[k] * left[0] + (int64_t)r.bv[k] * left[1]);
-            for (unsigned l = 0u; l <= k; l++) {
-                h[at++] += weight * ((int64_t)r.bu[k] * r.bu[l] + (int64_t)r.bv[k] * r.bv[l]);
-            }
+        for (unsigned k = 0u; k < 3u; k++) { /* slopes below 2^18: sums below 2^(36 + 1 + 16) */
+            const int32_t wu = (r.bu[k] * weight_q8) >> 8;
+            const int32_t wv = (r.bv[k] * weight_q8) >> 8;
+            g[k] += (int64_t)wu * left[0] + (int64_t)wv * left[1];
+            for (unsigned l = 0u; l <= k; l++) { h[at++] += (int64_t)wu * r.bu[l] + (int64_t)wv * r.bv[l]; }
         }
     }
     evs_scaled_t a[6];

@@ -79,5 +79,6 @@ evs_vec3_t ego_search(const ego_set_t *set)
             best = (evs_vec3_t){-v.x, -v.y, -v.z};
         }
     }
-    return best;
+    evs_vec3_t unit = best; /* the table is rounded to 14 bits */
+    return (evs_vec3_normalize(best, &unit) == EVS_OK) ? unit : best;
 }

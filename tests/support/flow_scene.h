@@ -77,9 +77,10 @@ static inline void scene_flow(double x, double y, double z, const double way[3],
     flow[1] = dy - y * dz;
 }
 
-/* n vectors of a scene. truth->v and truth->w are read; u and v of outliers are those of the header. */
-static inline void scene_make(const scene_settings_t *s, const scene_truth_t *truth, evs_egomotion_flow_t *out,
-                              size_t n)
+/* n vectors of a scene with truth->v and truth->w. bad[i], where it is not NULL, tells whether vector i is an outlier or
+ * belongs to the object. */
+static inline void scene_make_labelled(const scene_settings_t *s, const scene_truth_t *truth, evs_egomotion_flow_t *out,
+                                       size_t n, unsigned char *bad)
 {
     const double radius_px = sqrt(s->object_share * 240.0 * 180.0 / SCENE_PI);
     const double object_x = 40.0 + 160.0 * scene_uniform();
@@ -92,11 +93,13 @@ static inline void scene_make(const scene_settings_t *s, const scene_truth_t *tr
         const double x = (px - 132.0) / SCENE_F;
         const double y = (py - 110.0) / SCENE_F;
         const double z = s->depth_low_m + (s->depth_high_m - s->depth_low_m) * scene_uniform();
-        const double *const dir = (hypot(px - object_x, py - object_y) < radius_px) ? object_v : truth->v;
+        const bool on_object = hypot(px - object_x, py - object_y) < radius_px;
+        const double *const dir = on_object ? object_v : truth->v;
         const double way[3] = {dir[0] * s->way_m, dir[1] * s->way_m, dir[2] * s->way_m};
         double flow[2];
         scene_flow(x, y, z, way, truth->w, flow);
         out[i] = scene_vector(x, y, flow[0], flow[1]);
+        if (bad != NULL) { bad[i] = on_object ? 1u : 0u; }
     }
     for (size_t i = 0; i < n; i++) { /* lengths come from vectors before or after their own turn: either will do */
         double u = evs_q_to_double(out[i].u_q24, 24);
@@ -107,12 +110,19 @@ static inline void scene_make(const scene_settings_t *s, const scene_truth_t *tr
             const double angle = 2.0 * SCENE_PI * scene_uniform();
             u = length * cos(angle);
             v = length * sin(angle);
+            if (bad != NULL) { bad[i] = 1u; }
         }
         u += scene_normal() * s->noise_px / SCENE_F;
         v += scene_normal() * s->noise_px / SCENE_F;
         out[i].u_q24 = evs_q_from_double(u, 24);
         out[i].v_q24 = evs_q_from_double(v, 24);
     }
+}
+
+static inline void scene_make(const scene_settings_t *s, const scene_truth_t *truth, evs_egomotion_flow_t *out,
+                              size_t n)
+{
+    scene_make_labelled(s, truth, out, n, NULL);
 }
 
 static inline double scene_error_deg(const evs_egomotion_result_t *result, const double v[3])

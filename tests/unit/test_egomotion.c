@@ -375,7 +375,7 @@ static void test_rotation_prior(void)
 static void test_published_estimators(void)
 {
     enum { N = 60 };
-    const scene_settings_t s = scene_settings(0.05, 0.1);
+    const scene_settings_t s = scene_settings(0.02, 0.0);
     scene_truth_t truth = random_truth();
     scene_make(&s, &truth, flow, N);
     cfg.method = EVS_EGOMOTION_PAPER;

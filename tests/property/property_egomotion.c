@@ -1,0 +1,264 @@
+/* SPDX-License-Identifier: MIT
+ * SPDX-FileCopyrightText: 2026 the evstab authors */
+/*
+ * The direction of velocity over many random scenes: its error, whether its sigma is honest, the sign, and what happens
+ * where no answer is to be had; against the goals of the project and against models in double precision.
+ */
+#include "egomotion_model.h"
+#include "flow_scene.h"
+#include "unity.h"
+
+#include <stdio.h>
+
+enum { N = 500, TRIALS = 200 };
+
+static evs_egomotion_flow_t flow[N];
+static model_flow_t flow_d[N];
+static unsigned char bad[N];
+static uint64_t scratch[EVS_EGOMOTION_PAPER_BYTES(N) / 8u + 1u];
+static evs_egomotion_config_t cfg;
+static evs_egomotion_result_t result;
+static double errors[TRIALS];
+
+void setUp(void)
+{
+    cfg = evs_egomotion_config_default();
+    scene_seed = 2026u;
+}
+void tearDown(void) {}
+
+static scene_truth_t make(const scene_settings_t *s, double rotation_rad, size_t n)
+{
+    scene_truth_t truth = {{0, 0, 1}, {0, 0, 0}};
+    scene_direction(truth.v);
+    if (rotation_rad > 0.0) {
+        scene_direction(truth.w);
+        for (int k = 0; k < 3; k++) { truth.w[k] *= rotation_rad; }
+    }
+    scene_make_labelled(s, &truth, flow, n, bad);
+    for (size_t i = 0; i < n; i++) {
+        flow_d[i] = (model_flow_t){evs_q_to_double(flow[i].x_q24, 24), evs_q_to_double(flow[i].y_q24, 24),
+                                   evs_q_to_double(flow[i].u_q24, 24), evs_q_to_double(flow[i].v_q24, 24)};
+    }
+    return truth;
+}
+
+static double solve(const scene_truth_t *truth, size_t n)
+{
+    TEST_ASSERT_EQUAL_INT(EVS_OK, evs_egomotion_solve(&cfg, flow, n, scratch, sizeof scratch, &result));
+    return scene_error_deg(&result, truth->v);
+}
+
+static double angle_deg(const double a[3], const double b[3])
+{
+    double c[3];
+    model_cross(a, b, c);
+    return atan2(sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]), a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) * 180.0 /
+           SCENE_PI;
+}
+
+static int by_size(const void *a, const void *b)
+{
+    const double p = *(const double *)a;
+    const double q = *(const double *)b;
+    return (p > q) - (p < q);
+}
+
+/* --- the goals: 500 vectors, median flow 3 px ----------------------------------------------------------------- */
+
+static const double NOISE_PX[3] = {0.2, 0.5, 1.0};
+static const double OUTLIERS[4] = {0.0, 0.1, 0.3, 0.5};
+static const double GOAL_MEAN_DEG[3][4] = {{0.35, 0.4, 0.45, 0.55}, {0.85, 0.95, 1.1, 1.45}, {1.8, 2.0, 2.4, 3.1}};
+static const double GOAL_P95_DEG[3][4] = {{0.75, 0.9, 1.0, 1.3}, {1.9, 2.1, 2.6, 3.6}, {4.2, 4.5, 5.4, 8.0}};
+
+static void check_cell(int noise, int outliers)
+{
+    const scene_settings_t s = scene_settings(NOISE_PX[noise], OUTLIERS[outliers]);
+    double sum = 0.0, sum_sq = 0.0, sigma_sq = 0.0, of_model = 0.0, of_oracle = 0.0, apart = 0.0;
+    for (int t = 0; t < TRIALS; t++) {
+        const scene_truth_t truth = make(&s, 0.0, N);
+        double model[3] = {0, 0, 1}, oracle[3];
+        errors[t] = solve(&truth, N);
+        TEST_ASSERT_EQUAL_HEX32_MESSAGE(EVS_EGOMOTION_VALID, result.flags, "flagged");
+        TEST_ASSERT_TRUE_MESSAGE(errors[t] < 90.0, "the wrong sign");
+        sum += errors[t];
+        sum_sq += errors[t] * errors[t];
+        sigma_sq += scene_sigma_deg(&result) * scene_sigma_deg(&result);
+        model_robust(flow_d, N, model);
+        of_model += angle_deg(model, truth.v);
+        apart += scene_error_deg(&result, model);
+        model_oracle(flow_d, N, bad, truth.v, oracle);
+        of_oracle += angle_deg(oracle, truth.v);
+    }
+    qsort(errors, TRIALS, sizeof errors[0], by_size);
+    const double mean = sum / TRIALS;
+    const double p95 = errors[TRIALS * 95 / 100];
+    const double honesty = sqrt(sum_sq / sigma_sq);
+    (void)printf("%.1f px, %2.0f %%: mean %.2f (model %.2f, apart %.3f; oracle %.2f), p95 %.2f, RMS/sigma %.2f\n",
+                 s.noise_px, 100.0 * s.outliers, mean, of_model / TRIALS, apart / TRIALS, of_oracle / TRIALS, p95,
+                 honesty);
+    TEST_ASSERT_TRUE_MESSAGE(mean <= GOAL_MEAN_DEG[noise][outliers], "mean");
+    TEST_ASSERT_TRUE_MESSAGE(p95 <= GOAL_P95_DEG[noise][outliers], "p95");
+    TEST_ASSERT_TRUE_MESSAGE(mean <= ((OUTLIERS[outliers] < 0.4) ? 1.3 : 1.45) * of_oracle / TRIALS, "oracle");
+    TEST_ASSERT_TRUE_MESSAGE(fabs(sum / of_model - 1.0) <= 0.03, "integers against doubles");
+    TEST_ASSERT_TRUE_MESSAGE(apart / TRIALS <= 0.1 * mean, "integers far from doubles");
+    TEST_ASSERT_TRUE_MESSAGE((honesty >= 0.7) && (honesty <= 1.5), "sigma");
+}
+
+static void test_goals_noise_02(void)
+{
+    for (int i = 0; i < 4; i++) { check_cell(0, i); }
+}
+static void test_goals_noise_05(void)
+{
+    for (int i = 0; i < 4; i++) { check_cell(1, i); }
+}
+static void test_goals_noise_10(void)
+{
+    for (int i = 0; i < 4; i++) { check_cell(2, i); }
+}
+
+static double mean_error(const scene_settings_t *s, double rotation_rad, size_t n, int *n_valid)
+{
+    double sum = 0.0;
+    *n_valid = 0;
+    for (int t = 0; t < TRIALS; t++) {
+        const scene_truth_t truth = make(s, rotation_rad, n);
+        const double error = solve(&truth, n);
+        if ((result.flags & (uint32_t)EVS_EGOMOTION_VALID) == 0u) { continue; }
+        sum += error;
+        *n_valid += 1;
+    }
+    return sum / *n_valid;
+}
+
+static void test_few_vectors(void)
+{
+    const scene_settings_t s = scene_settings(0.5, 0.3);
+    int n_valid;
+    TEST_ASSERT_TRUE(mean_error(&s, 0.0, 100, &n_valid) <= 2.5);
+    TEST_ASSERT_TRUE(n_valid >= TRIALS * 97 / 100);
+}
+
+static void test_residual_rotation(void)
+{
+    const scene_settings_t s = scene_settings(0.5, 0.1);
+    const double rotation = 0.05 * SCENE_PI / 180.0; /* 1 deg/s over 50 ms */
+    int n_valid;
+    TEST_ASSERT_TRUE(mean_error(&s, rotation, N, &n_valid) <= 1.8);
+    cfg.rotation_sigma_rad_q28 = evs_q_from_double(rotation, 28);
+    TEST_ASSERT_TRUE(mean_error(&s, rotation, N, &n_valid) <= 1.35);
+    TEST_ASSERT_EQUAL_INT(TRIALS, n_valid);
+}
+
+/* Bad data at any rate: flags, or an error that sigma accounts for. Returns how many were confident and wrong. */
+static int count_wrong(const scene_settings_t *s, double rotation_rad, size_t n, int *n_valid)
+{
+    int n_wrong = 0;
+    *n_valid = 0;
+    for (int t = 0; t < TRIALS; t++) {
+        const scene_truth_t truth = make(s, rotation_rad, n);
+        const double error = solve(&truth, n);
+        if ((result.flags & (uint32_t)EVS_EGOMOTION_VALID) == 0u) { continue; }
+        *n_valid += 1;
+        if ((error > 1.0) && (error > 4.0 * scene_sigma_deg(&result))) { n_wrong++; }
+    }
+    return n_wrong;
+}
+
+static void test_never_confident_and_wrong(void)
+{
+    static const double OBJECT[] = {0.1, 0.2, 0.3};
+    int n_valid;
+    for (int noise = 0; noise < 3; noise++) {
+        scene_settings_t s = scene_settings(NOISE_PX[noise], 0.05);
+        for (size_t k = 0; k < 3u; k++) {
+            s.object_share = OBJECT[k];
+            const int n_wrong = count_wrong(&s, 0.0, N, &n_valid);
+            (void)printf("object over %.0f %%, %.1f px: %d valid, %d of them wrong\n", 100.0 * OBJECT[k], s.noise_px,
+                         n_valid, n_wrong);
+            TEST_ASSERT_TRUE(n_wrong <= TRIALS * 4 / 100); /* it may move much as the camera does */
+            TEST_ASSERT_TRUE(n_valid >= TRIALS * 9 / 10);
+        }
+        s = scene_settings(NOISE_PX[noise], 0.1); /* a plane that faces the camera */
+        s.depth_low_m = s.depth_high_m = 2.5;
+        TEST_ASSERT_TRUE(count_wrong(&s, 0.0, N, &n_valid) <= TRIALS / 100);
+        TEST_ASSERT_TRUE(n_valid >= ((noise < 2) ? TRIALS * 99 / 100 : TRIALS * 2 / 3));
+        s = scene_settings(NOISE_PX[noise], 0.1); /* nothing but rotation: 1 degree, 3.5 px */
+        s.way_m = 0.0;
+        (void)count_wrong(&s, SCENE_PI / 180.0, N, &n_valid);
+        TEST_ASSERT_TRUE(n_valid <= TRIALS / 50);
+        (void)count_wrong(&s, 0.0, N, &n_valid); /* nothing but noise */
+        TEST_ASSERT_EQUAL_INT(0, n_valid);
+        s = scene_settings(NOISE_PX[noise], 0.9); /* hardly a good vector */
+        (void)count_wrong(&s, 0.0, N, &n_valid);
+        TEST_ASSERT_TRUE(n_valid <= TRIALS / 100);
+        s = scene_settings(NOISE_PX[noise], 0.0);
+        (void)count_wrong(&s, 0.0, 5, &n_valid);
+        TEST_ASSERT_EQUAL_INT(0, n_valid);
+        const int n_wrong = count_wrong(&s, 0.0, 12, &n_valid);
+        (void)printf("12 vectors, %.1f px: %d valid, %d of them wrong\n", s.noise_px, n_valid, n_wrong);
+        TEST_ASSERT_TRUE(n_wrong <= TRIALS * 3 / 100);
+    }
+}
+
+/* Against the published formulas in double precision, on the same flow. */
+static void check_published(evs_egomotion_method_t method, double rotation_rad, double limit_deg)
+{
+    enum { M = 200, PROBLEMS = 12 };
+    const scene_settings_t s = scene_settings(0.3, 0.2);
+    cfg.method = method;
+    for (int t = 0; t < PROBLEMS; t++) {
+        const scene_truth_t truth = make(&s, rotation_rad, M);
+        double v[3];
+        (void)solve(&truth, M);
+        model_published(flow_d, M, method == EVS_EGOMOTION_ERL, v);
+        const double error = scene_error_deg(&result, v);
+        errors[t] = fmin(error, 180.0 - error);
+    }
+    qsort(errors, PROBLEMS, sizeof errors[0], by_size);
+    (void)printf("published: apart median %.3f, largest %.3f\n", errors[PROBLEMS / 2], errors[PROBLEMS - 1]);
+    TEST_ASSERT_TRUE(errors[PROBLEMS / 2] < limit_deg);
+    TEST_ASSERT_TRUE(errors[PROBLEMS - 1] < 4.0 * limit_deg);
+}
+
+static void test_published_erlv(void) { check_published(EVS_EGOMOTION_PAPER, 0.0, 0.1); }
+static void test_published_erl(void) { check_published(EVS_EGOMOTION_ERL, 0.02, 0.3); }
+
+static void test_any_numbers(void)
+{
+    for (int t = 0; t < 400; t++) {
+        const size_t n = (size_t)(scene_uniform() * 40.0);
+        const double size = pow(2.0, 31.0 * scene_uniform());
+        for (size_t i = 0; i < n; i++) {
+            const evs_egomotion_flow_t f = {
+                (int32_t)(4294967295.0 * scene_uniform() - 2147483648.0) >> (int)(8.0 * scene_uniform()),
+                (int32_t)(4294967295.0 * scene_uniform() - 2147483648.0) >> (int)(8.0 * scene_uniform()),
+                (int32_t)(size * (2.0 * scene_uniform() - 1.0)), (int32_t)(size * (2.0 * scene_uniform() - 1.0))};
+            flow[i] = f;
+        }
+        cfg.method = (evs_egomotion_method_t)(t % 16 == 0 ? 1 : (t % 16 == 1 ? 2 : 0));
+        cfg.rotation_sigma_rad_q28 = (t % 3 == 0) ? (int32_t)(268435456.0 * scene_uniform()) : 0;
+        TEST_ASSERT_EQUAL_INT(EVS_OK, evs_egomotion_solve(&cfg, flow, n, scratch, sizeof scratch, &result));
+        const double length = sqrt((double)evs_vec3_norm_sq(result.v_q30)) / 1073741824.0;
+        TEST_ASSERT_TRUE(fabs(length - 1.0) < 1e-6);
+        TEST_ASSERT_TRUE((result.sigma_rad_q28 >= 0) && (result.sigma_rad_q28 <= 843314857));
+        TEST_ASSERT_TRUE(result.n_inliers <= result.n_flow);
+        TEST_ASSERT_TRUE(result.n_flow + result.n_rejected <= n);
+    }
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_goals_noise_02);
+    RUN_TEST(test_goals_noise_05);
+    RUN_TEST(test_goals_noise_10);
+    RUN_TEST(test_few_vectors);
+    RUN_TEST(test_residual_rotation);
+    RUN_TEST(test_never_confident_and_wrong);
+    RUN_TEST(test_published_erlv);
+    RUN_TEST(test_published_erl);
+    RUN_TEST(test_any_numbers);
+    return UNITY_END();
+}
