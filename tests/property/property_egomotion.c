@@ -202,6 +202,46 @@ static void test_never_confident_and_wrong(void)
     }
 }
 
+/* A long lens, whose focus of expansion may be in view or far off: sigma must tell. */
+static void test_long_lenses(void)
+{
+    static const double REACH[] = {0.17, 0.05};
+    for (int k = 0; k < 2; k++) {
+        double sum_sq = 0.0, sigma_sq = 0.0;
+        int n_valid = 0;
+        for (int t = 0; t < TRIALS; t++) {
+            scene_truth_t truth = {{0, 0, 1}, {0, 0, 0}};
+            scene_direction(truth.v);
+            if (t % 2 == 0) { /* every other one flies forward or backward */
+                truth.v[0] *= 0.05;
+                truth.v[1] *= 0.05;
+                model_unit(truth.v);
+            }
+            double mean = 0.0;
+            for (size_t i = 0; i < N; i++) {
+                const double x = REACH[k] * (2.0 * scene_uniform() - 1.0);
+                const double y = REACH[k] * (2.0 * scene_uniform() - 1.0);
+                double uv[2];
+                scene_flow(x, y, 20.0 + 80.0 * scene_uniform(), truth.v, truth.w, uv);
+                flow[i] = scene_vector(x, y, uv[0], uv[1]);
+                mean += hypot(uv[0], uv[1]) / N;
+            }
+            for (size_t i = 0; i < N; i++) {
+                flow[i].u_q24 += (int32_t)(scene_normal() * 0.1 * mean * 16777216.0);
+                flow[i].v_q24 += (int32_t)(scene_normal() * 0.1 * mean * 16777216.0);
+            }
+            const double error = solve(&truth, N);
+            if ((result.flags & (uint32_t)EVS_EGOMOTION_VALID) == 0u) { continue; }
+            sum_sq += error * error;
+            sigma_sq += scene_sigma_deg(&result) * scene_sigma_deg(&result);
+            n_valid++;
+        }
+        (void)printf("reach %.2f: %d valid, RMS/sigma %.2f\n", REACH[k], n_valid, sqrt(sum_sq / sigma_sq));
+        TEST_ASSERT_TRUE(n_valid >= TRIALS * 2 / 5);
+        TEST_ASSERT_TRUE(sum_sq < 1.5 * 1.5 * sigma_sq);
+    }
+}
+
 /* Against the published formulas in double precision, on the same flow. */
 static void check_published(evs_egomotion_method_t method, double rotation_rad, double limit_deg)
 {
@@ -257,6 +297,7 @@ int main(void)
     RUN_TEST(test_few_vectors);
     RUN_TEST(test_residual_rotation);
     RUN_TEST(test_never_confident_and_wrong);
+    RUN_TEST(test_long_lenses);
     RUN_TEST(test_published_erlv);
     RUN_TEST(test_published_erl);
     RUN_TEST(test_any_numbers);
