@@ -10,7 +10,7 @@ enum {
     WIDE_STEPS = 2,   /* from the hypothesis to where the noise can be judged */
     NARROW_STEPS = 4, /* the noise is judged again after two of them */
     SCALE_MIN = 20,   /* steps: 2 % of the median flow, what 16 bits resolve without loss */
-    SCALE_MAX = 1 << EGO_MEDIAN_BITS,
+    SCALE_MAX = 1 << EVS_EGO_MEDIAN_BITS,
     SCALE_WIDE = SCALE_MAX / 2,
     NOISE_VECTORS = 256, /* enough to choose a scale by */
     INLIER_LIMIT_MIN = 8 /* steps: the rounding of what is free of noise */
@@ -52,7 +52,7 @@ static bool within(uint64_t n, uint64_t mean_q16, uint32_t k)
 }
 
 /* How many steps a vector is long, to 7 %: good enough to guess at chance. */
-static uint32_t about_length(const ego_vector_t *p)
+static uint32_t about_length(const evs_ego_vector_t *p)
 {
     const uint32_t u = evs_abs_u32(p->u);
     const uint32_t v = evs_abs_u32(p->v);
@@ -60,15 +60,15 @@ static uint32_t about_length(const ego_vector_t *p)
 }
 
 /* Whether a vector ends within `limit` steps of the line along a, on the side that d tells. */
-static bool is_near_line(const ego_view_t *w, uint32_t limit)
+static bool is_near_line(const evs_ego_view_t *w, uint32_t limit)
 {
     return (uint64_t)((int64_t)w->c * w->c) <= (uint64_t)w->a2 * (limit * limit);
 }
 
 /* Vectors by cells of the image. */
 typedef struct {
-    uint16_t n_all[EGO_CELLS];
-    uint16_t n_good[EGO_CELLS];
+    uint16_t n_all[EVS_EGO_CELLS];
+    uint16_t n_good[EVS_EGO_CELLS];
 } cells_t;
 
 /* Whether the outliers come in patches, as those of an object that moves by itself do, and not evenly: chi^2 per degree of
@@ -79,7 +79,7 @@ static evs_scaled_t patchiness(const cells_t *cells, uint32_t n_all, uint32_t n_
     const int64_t good = n_good;
     evs_scaled_t sum = evs_scaled(0, 0);
     int32_t n_used = 0;
-    for (unsigned c = 0u; c < EGO_CELLS; c++) {
+    for (unsigned c = 0u; c < EVS_EGO_CELLS; c++) {
         if (cells->n_all[c] == 0u) { continue; }
         const evs_scaled_t off = evs_scaled(cells->n_good[c] * n - cells->n_all[c] * good, 0);
         const evs_scaled_t variance = evs_scaled(cells->n_all[c] * good * (n - good) + n * n / 4 + 1, 0);
@@ -94,17 +94,17 @@ static evs_scaled_t patchiness(const cells_t *cells, uint32_t n_all, uint32_t n_
 
 /* Count the vectors that agree, and ask whether they are enough, more than chance would give, and of one sign.
  * Returns the patchiness of the others. */
-static evs_scaled_t judge_count(const ego_set_t *set, evs_egomotion_result_t *result)
+static evs_scaled_t judge_count(const evs_ego_set_t *set, evs_egomotion_result_t *result)
 {
     cells_t cells = {{0}, {0}};
-    const ego_dir_t dir = ego_dir(set, result->v_q30);
+    const evs_ego_dir_t dir = evs_ego_dir(set, result->v_q30);
     const uint32_t limit = result->inlier_limit_;
     uint64_t chance_q16 = 0u;
     uint32_t n_against = 0u;
     for (uint32_t i = 0u; i < set->n; i++) {
-        const ego_view_t w = ego_view(&set->vec[i], dir);
+        const evs_ego_view_t w = evs_ego_view(&set->vec[i], dir);
         chance_q16 += by_chance_q16(about_length(&set->vec[i]), limit);
-        const uint32_t cell = ego_cell(set, &set->vec[i]);
+        const uint32_t cell = evs_ego_cell(set, &set->vec[i]);
         cells.n_all[cell]++;
         if (!is_near_line(&w, limit)) { continue; }
         cells.n_good[cell] = (uint16_t)(cells.n_good[cell] + ((w.d > 0) ? 1u : 0u));
@@ -123,11 +123,11 @@ static evs_scaled_t judge_count(const ego_set_t *set, evs_egomotion_result_t *re
 
 bool evs_egomotion_is_inlier(const evs_egomotion_result_t *result, const evs_egomotion_flow_t *flow)
 {
-    ego_vector_t p;
+    evs_ego_vector_t p;
     EVS_ASSERT((result != NULL) && (flow != NULL));
-    if ((result->n_flow == 0u) || !ego_pack_one(result, flow, &p)) { return false; }
-    const ego_set_t set = {.one_bits = 13u - result->position_shift_};
-    const ego_view_t w = ego_view(&p, ego_dir(&set, result->v_q30));
+    if ((result->n_flow == 0u) || !evs_ego_pack_one(result, flow, &p)) { return false; }
+    const evs_ego_set_t set = {.one_bits = 13u - result->position_shift_};
+    const evs_ego_view_t w = evs_ego_view(&p, evs_ego_dir(&set, result->v_q30));
     return (w.d > 0) && is_near_line(&w, result->inlier_limit_);
 }
 
@@ -137,12 +137,12 @@ typedef struct {
     evs_scaled_t patchiness;
 } judgement_t;
 
-static judgement_t judge(const ego_set_t *set, evs_egomotion_result_t *result)
+static judgement_t judge(const evs_ego_set_t *set, evs_egomotion_result_t *result)
 {
     judgement_t j;
-    j.noise = ego_noise(set, result->v_q30, NOISE_VECTORS);
-    result->noise_q24 = ego_steps_to_q24(result, j.noise);
-    result->inlier_limit_ = (uint16_t)evs_clamp((int32_t)(j.noise * 5u / 2u), INLIER_LIMIT_MIN, 2 * EGO_CLIP);
+    j.noise = evs_ego_noise(set, result->v_q30, NOISE_VECTORS);
+    result->noise_q24 = evs_ego_steps_to_q24(result, j.noise);
+    result->inlier_limit_ = (uint16_t)evs_clamp((int32_t)(j.noise * 5u / 2u), INLIER_LIMIT_MIN, 2 * EVS_EGO_CLIP);
     j.patchiness = judge_count(set, result);
     return j;
 }
@@ -161,7 +161,7 @@ static void put_spread(const evs_egomotion_config_t *cfg, const judgement_t *jud
     const evs_scaled_t few = evs_scaled_div(evs_scaled(n * cfg->variance_factor_q8, -8), evs_scaled(n - 4, 0));
     const evs_scaled_t factor = evs_scaled_mul(few, evs_scaled_sqrt(judgement->patchiness));
     for (unsigned i = 0u; i < 3u; i++) { cov[i] = evs_scaled_mul(cov[i], factor); }
-    const ego_frame_t f = ego_frame(result->v_q30);
+    const evs_ego_frame_t f = evs_ego_frame(result->v_q30);
     const evs_scaled_t sigma = evs_scaled_sqrt(evs_scaled_add(cov[0], cov[2]));
     const int32_t sigma_q28 = evs_scaled_to_q(sigma, 28);
     if (sigma_q28 > SIGMA_MAX_Q28) {
@@ -186,11 +186,11 @@ static void put_spread(const evs_egomotion_config_t *cfg, const judgement_t *jud
 
 /* What one call works on. */
 typedef struct {
-    ego_set_t set;
+    evs_ego_set_t set;
     uint32_t *likelihood; /* PAPER, ERL: room for one per vector */
     const evs_egomotion_flow_t *flow;
     size_t n;
-} ego_call_t;
+} evs_ego_call_t;
 
 /* --- the robust estimate ---------------------------------------------------------------------------------------- */
 
@@ -200,62 +200,62 @@ static uint32_t kernel_scale(uint32_t noise)
 }
 
 /* The narrow steps with the rotation: it is taken out of the flow anew after each. */
-static uint32_t refine_rotation(const evs_egomotion_config_t *cfg, const ego_call_t *call, evs_vec3_t *v,
-                                ego_rotation_t *rot, evs_egomotion_result_t *result)
+static uint32_t refine_rotation(const evs_egomotion_config_t *cfg, const evs_ego_call_t *call, evs_vec3_t *v,
+                                evs_ego_rotation_t *rot, evs_egomotion_result_t *result)
 {
     uint32_t s = SCALE_WIDE;
     for (int i = 0; i < NARROW_STEPS; i++) {
         if ((i & 1) == 0) {
-            const uint32_t noise = ego_noise(&call->set, *v, NOISE_VECTORS);
+            const uint32_t noise = evs_ego_noise(&call->set, *v, NOISE_VECTORS);
             s = kernel_scale(noise);
-            rot->prior = ego_rotation_prior(&call->set, result, noise, cfg->rotation_sigma_rad_q28);
+            rot->prior = evs_ego_rotation_prior(&call->set, result, noise, cfg->rotation_sigma_rad_q28);
         }
-        if (!ego_step_rotation(&call->set, result, s, v, rot)) { break; }
+        if (!evs_ego_step_rotation(&call->set, result, s, v, rot)) { break; }
         result->rotation_rad_q28 = rot->rad_q28;
-        ego_repack(&call->set, call->flow, call->n, result);
+        evs_ego_repack(&call->set, call->flow, call->n, result);
     }
     return s;
 }
 
-static void solve_robust(const evs_egomotion_config_t *cfg, const ego_call_t *call, evs_egomotion_result_t *result)
+static void solve_robust(const evs_egomotion_config_t *cfg, const evs_ego_call_t *call, evs_egomotion_result_t *result)
 {
-    const ego_set_t *const set = &call->set;
+    const evs_ego_set_t *const set = &call->set;
     const bool with_rotation = cfg->rotation_sigma_rad_q28 > 0;
-    ego_rotation_t rot = {{0, 0, 0}, {0, 0}};
-    evs_vec3_t v = ego_search(set);
+    evs_ego_rotation_t rot = {{0, 0, 0}, {0, 0}};
+    evs_vec3_t v = evs_ego_search(set);
     uint32_t s = SCALE_WIDE;
-    const uint32_t some = (set->n + EGO_SUBSET - 1u) / EGO_SUBSET;
-    for (int i = 0; i < WIDE_STEPS; i++) { (void)ego_step(set, s, some, &v); }
+    const uint32_t some = (set->n + EVS_EGO_SUBSET - 1u) / EVS_EGO_SUBSET;
+    for (int i = 0; i < WIDE_STEPS; i++) { (void)evs_ego_step(set, s, some, &v); }
     if (with_rotation) {
         s = refine_rotation(cfg, call, &v, &rot, result);
     } else {
         const uint32_t fewer = (set->n + NOISE_VECTORS - 1u) / NOISE_VECTORS;
         for (int i = 0; i < NARROW_STEPS; i++) {
-            if ((i & 1) == 0) { s = kernel_scale(ego_noise(set, v, NOISE_VECTORS)); }
-            (void)ego_step(set, s, (i < 2) ? fewer : 1u, &v); /* what the later ones correct costs half */
+            if ((i & 1) == 0) { s = kernel_scale(evs_ego_noise(set, v, NOISE_VECTORS)); }
+            (void)evs_ego_step(set, s, (i < 2) ? fewer : 1u, &v); /* what the later ones correct costs half */
         }
     }
     result->v_q30 = v;
     const judgement_t j = judge(set, result);
-    if (ego_is_rotation(set, v, s)) { result->flags |= EVS_EGOMOTION_ROTATION; }
-    const ego_frame_t f = ego_frame(v);
+    if (evs_ego_is_rotation(set, v, s)) { result->flags |= EVS_EGOMOTION_ROTATION; }
+    const evs_ego_frame_t f = evs_ego_frame(v);
     evs_scaled_t cov[3];
-    const bool definite =
-        with_rotation ? ego_covariance_rotation(set, &f, s, j.noise, rot.prior, cov) : ego_covariance(set, &f, s, cov);
+    const bool definite = with_rotation ? evs_ego_covariance_rotation(set, &f, s, j.noise, rot.prior, cov)
+                                        : evs_ego_covariance(set, &f, s, cov);
     put_spread(cfg, &j, definite ? cov : NULL, result);
 }
 
 /* --- the published estimates ------------------------------------------------------------------------------------ */
 
-static void solve_paper(const evs_egomotion_config_t *cfg, const ego_call_t *call, evs_egomotion_result_t *result)
+static void solve_paper(const evs_egomotion_config_t *cfg, const evs_ego_call_t *call, evs_egomotion_result_t *result)
 {
-    const ego_set_t *const set = &call->set;
+    const evs_ego_set_t *const set = &call->set;
     const bool joint = cfg->method == EVS_EGOMOTION_ERL;
     evs_scaled_t cov[3];
-    const bool definite = ego_paper(set, joint, call->likelihood, result, cov);
-    ego_repack(set, call->flow, call->n, result);
+    const bool definite = evs_ego_paper(set, joint, call->likelihood, result, cov);
+    evs_ego_repack(set, call->flow, call->n, result);
     const judgement_t j = judge(set, result);
-    if (!joint && ego_is_rotation(set, result->v_q30, kernel_scale(j.noise))) {
+    if (!joint && evs_ego_is_rotation(set, result->v_q30, kernel_scale(j.noise))) {
         result->flags |= EVS_EGOMOTION_ROTATION;
     }
     put_spread(cfg, &j, definite ? cov : NULL, result);
@@ -275,14 +275,14 @@ evs_status_t evs_egomotion_solve(const evs_egomotion_config_t *cfg, const evs_eg
     if ((n > EVS_EGOMOTION_N_MAX) || (n_scratch < n_needed) || (((uintptr_t)scratch & 3u) != 0u)) {
         return EVS_ERR_SIZE;
     }
-    ego_call_t call = {.set = {.subset = scratch, .one_bits = 13u}, .flow = flow, .n = n};
+    evs_ego_call_t call = {.set = {.subset = scratch, .one_bits = 13u}, .flow = flow, .n = n};
     if (n > 0u) {
-        call.set.vec = (ego_vector_t *)(call.set.subset + 1);
+        call.set.vec = (evs_ego_vector_t *)(call.set.subset + 1);
         call.likelihood = (uint32_t *)(void *)(call.set.vec + n); /* 8 n bytes on: still aligned */
         call.set.key = robust ? (uint16_t *)call.likelihood : (uint16_t *)(call.likelihood + n);
     }
     evs_egomotion_result_t r = {.v_q30 = {0, 0, EVS_ONE_Q30}, .sigma_rad_q28 = PI_Q28};
-    ego_pack(&call.set, flow, n, &r);
+    evs_ego_pack(&call.set, flow, n, &r);
     if (call.set.n == 0u) {
         r.flags = EVS_EGOMOTION_FEW | EVS_EGOMOTION_STILL;
     } else if (robust) {

@@ -10,14 +10,14 @@
 /* --- order ------------------------------------------------------------------------------------------------------ */
 
 /* 6 bits of exponent, 10 of mantissa. */
-uint16_t ego_key(uint64_t x)
+uint16_t evs_ego_key(uint64_t x)
 {
     if (x < 1024u) { return (uint16_t)x; }
     const unsigned shift = 53u - evs_clz64(x);                 /* leaves 11 bits, the first of them 1 */
     return (uint16_t)((shift << 10) + (uint32_t)(x >> shift)); /* the leading 1 adds one to the exponent */
 }
 
-uint64_t ego_key_value(uint16_t key)
+uint64_t evs_ego_key_value(uint16_t key)
 {
     if (key < 2048u) { return key; }
     const unsigned shift = ((unsigned)key >> 10) - 1u;
@@ -42,7 +42,7 @@ static uint32_t narrow(const uint16_t *key, uint32_t n, uint32_t prefix, unsigne
     return (prefix << n_bits) | group;
 }
 
-uint16_t ego_select(const uint16_t *key, uint32_t n, uint32_t k)
+uint16_t evs_ego_select(const uint16_t *key, uint32_t n, uint32_t k)
 {
     uint32_t prefix = narrow(key, n, 0u, 10u, 6u, &k);
     prefix = narrow(key, n, prefix, 5u, 5u, &k);
@@ -85,7 +85,7 @@ static void derotate(const evs_vec3_t w, const evs_egomotion_flow_t *f, int32_t 
     uv_q24[1] = without(f->v_q24, yy * w.x - xy * w.y - (int64_t)f->x_q24 * w.z);
 }
 
-/* To at most EGO_CLIP, keeping the direction. */
+/* To at most EVS_EGO_CLIP, keeping the direction. */
 static void shorten(uint64_t longer, int64_t *u, int64_t *v)
 {
     if (longer >= (UINT64_C(1) << 30)) { /* keep the squares in range */
@@ -94,15 +94,15 @@ static void shorten(uint64_t longer, int64_t *u, int64_t *v)
         *v >>= down;
     }
     const uint64_t sq = (uint64_t)(*u * *u) + (uint64_t)(*v * *v);
-    if (sq <= (uint64_t)EGO_CLIP * EGO_CLIP) { return; }
+    if (sq <= (uint64_t)EVS_EGO_CLIP * EVS_EGO_CLIP) { return; }
     unsigned shift;
-    const uint32_t r = evs_rsqrt_u64(sq, &shift);                     /* 1 / length = r 2^-shift, shift >= 44 */
-    const int64_t factor = (int64_t)(((uint64_t)r * EGO_CLIP) >> 15); /* < 2^30, and so are u and v */
+    const uint32_t r = evs_rsqrt_u64(sq, &shift);                         /* 1 / length = r 2^-shift, shift >= 44 */
+    const int64_t factor = (int64_t)(((uint64_t)r * EVS_EGO_CLIP) >> 15); /* < 2^30, and so are u and v */
     *u = evs_shr_r64(*u * factor, shift - 15u);
     *v = evs_shr_r64(*v * factor, shift - 15u);
 }
 
-bool ego_pack_one(const evs_egomotion_result_t *scale, const evs_egomotion_flow_t *flow, ego_vector_t *packed)
+bool evs_ego_pack_one(const evs_egomotion_result_t *scale, const evs_egomotion_flow_t *flow, evs_ego_vector_t *packed)
 {
     if (!position_ok(flow) || is_still(flow)) { return false; }
     /* Q24 with 1 = 2^24 to 1 = 2^(14 - position_shift_); the last value of the range must not round up out of 16 bits */
@@ -115,36 +115,38 @@ bool ego_pack_one(const evs_egomotion_result_t *scale, const evs_egomotion_flow_
     int64_t u = to_steps(scale, uv_q24[0]);
     int64_t v = to_steps(scale, uv_q24[1]);
     const uint64_t longer = (magnitude(u) > magnitude(v)) ? magnitude(u) : magnitude(v);
-    if (longer > (uint64_t)EGO_CLIP * 181u / 256u) { shorten(longer, &u, &v); } /* else below EGO_CLIP / sqrt(2) */
+    if (longer > (uint64_t)EVS_EGO_CLIP * 181u / 256u) {
+        shorten(longer, &u, &v);
+    } /* else below EVS_EGO_CLIP / sqrt(2) */
     packed->u = (int16_t)u;
     packed->v = (int16_t)v;
     return true;
 }
 
-uint32_t ego_steps_to_q24(const evs_egomotion_result_t *scale, uint32_t steps)
+uint32_t evs_ego_steps_to_q24(const evs_egomotion_result_t *scale, uint32_t steps)
 {
-    const uint64_t x = ((uint64_t)steps * scale->median_flow_q24) >> EGO_MEDIAN_BITS;
+    const uint64_t x = ((uint64_t)steps * scale->median_flow_q24) >> EVS_EGO_MEDIAN_BITS;
     return (x < UINT32_MAX) ? (uint32_t)x : UINT32_MAX;
 }
 
-static void lay_grid(ego_set_t *set)
+static void lay_grid(evs_ego_set_t *set)
 {
     int32_t right = INT16_MIN;
     int32_t bottom = INT16_MIN;
     set->left = INT16_MAX;
     set->top = INT16_MAX;
     for (uint32_t i = 0u; i < set->n; i++) {
-        const ego_vector_t *const p = &set->vec[i];
+        const evs_ego_vector_t *const p = &set->vec[i];
         if (p->x < set->left) { set->left = p->x; }
         if (p->x > right) { right = p->x; }
         if (p->y < set->top) { set->top = p->y; }
         if (p->y > bottom) { bottom = p->y; }
     }
-    set->per_column_q16 = (EGO_COLUMNS << 16) / (uint32_t)(right - set->left + 1);
-    set->per_row_q16 = (EGO_ROWS << 16) / (uint32_t)(bottom - set->top + 1);
+    set->per_column_q16 = (EVS_EGO_COLUMNS << 16) / (uint32_t)(right - set->left + 1);
+    set->per_row_q16 = (EVS_EGO_ROWS << 16) / (uint32_t)(bottom - set->top + 1);
 }
 
-void ego_pack(ego_set_t *set, const evs_egomotion_flow_t *flow, size_t n, evs_egomotion_result_t *result)
+void evs_ego_pack(evs_ego_set_t *set, const evs_egomotion_flow_t *flow, size_t n, evs_egomotion_result_t *result)
 {
     uint32_t reach = 0u; /* bits of the largest coordinate */
     set->n = 0u;
@@ -153,31 +155,32 @@ void ego_pack(ego_set_t *set, const evs_egomotion_flow_t *flow, size_t n, evs_eg
             result->n_rejected++;
         } else if (!is_still(&flow[i])) {
             reach |= evs_abs_u32(flow[i].x_q24) | evs_abs_u32(flow[i].y_q24);
-            set->key[set->n++] = ego_key(length_sq(&flow[i]));
+            set->key[set->n++] = evs_ego_key(length_sq(&flow[i]));
         }
     }
     result->n_flow = set->n;
     if (set->n == 0u) { return; }
 
-    const uint32_t median =
-        evs_sqrt_u64(ego_key_value(ego_select(set->key, set->n, set->n / 2u))); /* at least 1: nothing here is still */
+    const uint32_t median = evs_sqrt_u64(
+        evs_ego_key_value(evs_ego_select(set->key, set->n, set->n / 2u))); /* at least 1: nothing here is still */
     unsigned recip_shift;
     const uint32_t recip = evs_recip_u32(median, &recip_shift); /* 1 / median = recip / 2^recip_shift */
     result->median_flow_q24 = median;
     result->scale_ = recip >> 1; /* 31 bits: times any int32_t it leaves room for rounding */
-    result->scale_shift_ = (uint8_t)(recip_shift - 1u - (unsigned)EGO_MEDIAN_BITS);
+    result->scale_shift_ = (uint8_t)(recip_shift - 1u - (unsigned)EVS_EGO_MEDIAN_BITS);
     result->position_shift_ =
         (uint8_t)((reach >= (UINT32_C(4) << 24)) ? 2u : ((reach >= (UINT32_C(2) << 24)) ? 1u : 0u));
     set->one_bits = 13u - result->position_shift_;
 
-    ego_repack(set, flow, n, result);
+    evs_ego_repack(set, flow, n, result);
     lay_grid(set);
 }
 
-void ego_repack(const ego_set_t *set, const evs_egomotion_flow_t *flow, size_t n, const evs_egomotion_result_t *scale)
+void evs_ego_repack(const evs_ego_set_t *set, const evs_egomotion_flow_t *flow, size_t n,
+                    const evs_egomotion_result_t *scale)
 {
-    ego_vector_t *out = set->vec;
+    evs_ego_vector_t *out = set->vec;
     for (size_t i = 0u; i < n; i++) {
-        if (ego_pack_one(scale, &flow[i], out)) { out++; }
+        if (evs_ego_pack_one(scale, &flow[i], out)) { out++; }
     }
 }

@@ -20,7 +20,7 @@ enum {
 
 /* What the estimators share. */
 typedef struct {
-    const ego_set_t *set;
+    const evs_ego_set_t *set;
     uint32_t *likelihood; /* sum over hypotheses */
     bool joint;
     bool weighted; /* by set->key, Q15; else all vectors count alike */
@@ -36,17 +36,17 @@ typedef struct {
     int32_t n_q13[3];
 } row_t;
 
-static row_t make_row(const paper_t *e, uint32_t i, ego_dir_t dir)
+static row_t make_row(const paper_t *e, uint32_t i, evs_ego_dir_t dir)
 {
-    const ego_vector_t *const p = &e->set->vec[i];
-    const ego_view_t w = ego_view(p, dir);
+    const evs_ego_vector_t *const p = &e->set->vec[i];
+    const evs_ego_view_t w = evs_ego_view(p, dir);
     row_t row = {0, {0, 0, 0}};
     if (w.a2 == 0u) { return row; } /* at the focus itself any flow will do */
     unsigned shift;
     const uint32_t r = evs_rsqrt_u64(w.a2, &shift) >> 1; /* 1 / |a| = r 2^-(shift - 1) */
     row.r0_q4 = (int32_t)(((int64_t)w.c * r) >> (shift - 5u));
     if (e->joint) {
-        const ego_rows_t b = ego_rows(e->set, p);
+        const evs_ego_rows_t b = evs_ego_rows(e->set, p);
         for (unsigned k = 0u; k < 3u; k++) { /* bu, bv at 2^(one_bits + 1), a / |a| without unit */
             const int64_t across = ((int64_t)b.bv[k] * w.ax - (int64_t)b.bu[k] * w.ay) >> 8;
             row.n_q13[k] = evs_sat32((across * r) >> (shift - 1u - 8u + e->set->one_bits + 1u - 13u));
@@ -55,17 +55,17 @@ static row_t make_row(const paper_t *e, uint32_t i, ego_dir_t dir)
     return row;
 }
 
-static int32_t residual_q4(const row_t *row, const ego_turn_t *t)
+static int32_t residual_q4(const row_t *row, const evs_ego_turn_t *t)
 {
     int64_t r = 0;
     for (unsigned k = 0u; k < 3u; k++) { r += (int64_t)row->n_q13[k] * t->w_q8[k]; }
-    return evs_clamp(evs_sat32(row->r0_q4 + (r >> 17)), -(EGO_CLIP << 6), EGO_CLIP << 6);
+    return evs_clamp(evs_sat32(row->r0_q4 + (r >> 17)), -(EVS_EGO_CLIP << 6), EVS_EGO_CLIP << 6);
 }
 
 /* The rotation that suits a direction best. */
-static ego_turn_t eliminate(const paper_t *e, ego_dir_t dir)
+static evs_ego_turn_t eliminate(const paper_t *e, evs_ego_dir_t dir)
 {
-    ego_turn_t t = {{0, 0, 0}};
+    evs_ego_turn_t t = {{0, 0, 0}};
     if (!e->joint) { return t; }
     int64_t h[6] = {0};
     int64_t g[3] = {0};
@@ -84,14 +84,16 @@ static ego_turn_t eliminate(const paper_t *e, ego_dir_t dir)
     for (unsigned i = 0u; i < 6u; i++) { a[i] = evs_scaled(h[i], 8 - 26); }
     for (unsigned k = 0u; k < 3u; k++) { x[k] = evs_scaled(g[k], 4 - 13 - 4); }
     if (!evs_scaled_solve(a, x, 3u)) { return t; }
-    for (unsigned k = 0u; k < 3u; k++) { t.w_q8[k] = evs_clamp(evs_scaled_to_q(x[k], 8), -EGO_TURN_MAX, EGO_TURN_MAX); }
+    for (unsigned k = 0u; k < 3u; k++) {
+        t.w_q8[k] = evs_clamp(evs_scaled_to_q(x[k], 8), -EVS_EGO_TURN_MAX, EVS_EGO_TURN_MAX);
+    }
     return t;
 }
 
 /* Sum of w^2 r^2. */
-static uint64_t cost(const paper_t *e, evs_vec3_t v_q30, ego_turn_t *turn)
+static uint64_t cost(const paper_t *e, evs_vec3_t v_q30, evs_ego_turn_t *turn)
 {
-    const ego_dir_t dir = ego_dir(e->set, v_q30);
+    const evs_ego_dir_t dir = evs_ego_dir(e->set, v_q30);
     *turn = eliminate(e, dir);
     uint64_t sum = 0u;
     for (uint32_t i = 0u; i < e->set->n; i++) {
@@ -119,9 +121,9 @@ static evs_vec3_t node(uint32_t azimuth, uint32_t radius, uint32_t n)
 }
 
 /* r^2 over the length of the flow, Q8. */
-static uint32_t error_q8(const paper_t *e, uint32_t i, ego_dir_t dir, const ego_turn_t *t)
+static uint32_t error_q8(const paper_t *e, uint32_t i, evs_ego_dir_t dir, const evs_ego_turn_t *t)
 {
-    const ego_vector_t *const p = &e->set->vec[i];
+    const evs_ego_vector_t *const p = &e->set->vec[i];
     const row_t row = make_row(e, i, dir);
     const int64_t r_q4 = residual_q4(&row, t);
     const uint32_t length = evs_sqrt_u64((uint64_t)(p->u * p->u + p->v * p->v));
@@ -133,8 +135,8 @@ static uint32_t error_q8(const paper_t *e, uint32_t i, ego_dir_t dir, const ego_
 static void add_likelihood(const paper_t *e, evs_vec3_t v_q30)
 {
     const uint32_t n = e->set->n;
-    const ego_dir_t dir = ego_dir(e->set, v_q30);
-    const ego_turn_t t = eliminate(e, dir);
+    const evs_ego_dir_t dir = evs_ego_dir(e->set, v_q30);
+    const evs_ego_turn_t t = eliminate(e, dir);
     uint64_t sum = 0u;
     for (uint32_t i = 0u; i < n; i++) { sum += error_q8(e, i, dir, &t); }
     const uint64_t mean = sum / n;
@@ -175,7 +177,7 @@ static void make_weights(paper_t *e)
 static evs_vec3_t search_grid(const paper_t *e, uint64_t *least)
 {
     evs_vec3_t best = {0, 0, EVS_ONE_Q30};
-    ego_turn_t t;
+    evs_ego_turn_t t;
     *least = UINT64_MAX;
     for (uint32_t radius = 0u; radius < GRID_FINE; radius++) {
         for (uint32_t azimuth = 0u; azimuth < GRID_FINE; azimuth++) {
@@ -195,15 +197,15 @@ static evs_vec3_t search_grid(const paper_t *e, uint64_t *least)
 static evs_vec3_t downhill(const paper_t *e, evs_vec3_t v, uint64_t least)
 {
     for (int32_t reach = 2 * FINEST << HALVINGS; reach > FINEST;) {
-        const ego_frame_t f = ego_frame(v);
+        const evs_ego_frame_t f = evs_ego_frame(v);
         bool lower = false;
         for (uint32_t k = 0u; (k < 8u) && !lower; k++) {
             int32_t sin_q30;
             int32_t cos_q30;
-            ego_turn_t turn;
+            evs_ego_turn_t turn;
             evs_sincos((int32_t)(k << 29), &sin_q30, &cos_q30);
-            const evs_vec3_t next = ego_move(&f, evs_scaled(evs_q_mul(cos_q30, reach, 30u), -30),
-                                             evs_scaled(evs_q_mul(sin_q30, reach, 30u), -30));
+            const evs_vec3_t next = evs_ego_move(&f, evs_scaled(evs_q_mul(cos_q30, reach, 30u), -30),
+                                                 evs_scaled(evs_q_mul(sin_q30, reach, 30u), -30));
             const uint64_t here = cost(e, next, &turn);
             lower = here < least;
             if (lower) {
@@ -219,27 +221,28 @@ static evs_vec3_t downhill(const paper_t *e, evs_vec3_t v, uint64_t least)
 /* --- spread ----------------------------------------------------------------------------------------------------- */
 
 typedef struct {
-    int64_t h[N_TRIANGLE];     /* sum of w^2 J J' */
-    int64_t z[EGO_CELLS][DIM]; /* sum of w^2 r J by cells */
+    int64_t h[N_TRIANGLE];         /* sum of w^2 J J' */
+    int64_t z[EVS_EGO_CELLS][DIM]; /* sum of w^2 r J by cells */
 } sums_t;
 
-static void add_up(const paper_t *e, const ego_frame_t *f, const ego_turn_t *turn, sums_t *sums)
+static void add_up(const paper_t *e, const evs_ego_frame_t *f, const evs_ego_turn_t *turn, sums_t *sums)
 {
-    const ego_set_t *const set = e->set;
-    const ego_loop_t loop = ego_loop(set, f, 1u << EGO_MEDIAN_BITS); /* for its directions */
+    const evs_ego_set_t *const set = e->set;
+    const evs_ego_loop_t loop = evs_ego_loop(set, f, 1u << EVS_EGO_MEDIAN_BITS); /* for its directions */
     *sums = (sums_t){.h = {0}};
     for (uint32_t i = 0u; i < set->n; i++) {
-        const ego_rows_t rows = ego_rows(set, &set->vec[i]);
+        const evs_ego_rows_t rows = evs_ego_rows(set, &set->vec[i]);
         int32_t left[2];
-        ego_left_over(set, &set->vec[i], &rows, turn, left);
-        const ego_vector_t p = {set->vec[i].x, set->vec[i].y, (int16_t)evs_clamp(left[0], -EGO_CLIP, EGO_CLIP),
-                                (int16_t)evs_clamp(left[1], -EGO_CLIP, EGO_CLIP)};
-        const ego_view_t w = ego_view(&p, loop.v);
-        if (ego_near_focus(set, &w)) { continue; }
+        evs_ego_left_over(set, &set->vec[i], &rows, turn, left);
+        const evs_ego_vector_t p = {set->vec[i].x, set->vec[i].y,
+                                    (int16_t)evs_clamp(left[0], -EVS_EGO_CLIP, EVS_EGO_CLIP),
+                                    (int16_t)evs_clamp(left[1], -EVS_EGO_CLIP, EVS_EGO_CLIP)};
+        const evs_ego_view_t w = evs_ego_view(&p, loop.v);
+        if (evs_ego_near_focus(set, &w)) { continue; }
         const uint32_t weight_q30 = weight_q15(e, i) * weight_q15(e, i);
-        const uint32_t inv = ego_inv_a2(set, w.a2);
-        const ego_slope_t slope = ego_slope(set, &p, w.d, inv, loop.b0, loop.b1);
-        const int32_t wr_q2 = evs_mul_hi((int32_t)weight_q30, ego_over_a2_q2(set, w.c, inv) * 4);
+        const uint32_t inv = evs_ego_inv_a2(set, w.a2);
+        const evs_ego_slope_t slope = evs_ego_slope(set, &p, w.d, inv, loop.b0, loop.b1);
+        const int32_t wr_q2 = evs_mul_hi((int32_t)weight_q30, evs_ego_over_a2_q2(set, w.c, inv) * 4);
         int32_t j[DIM] = {slope.j0, slope.j1, 0, 0, 0};
         for (unsigned k = 0u; e->joint && (k < 3u); k++) {
             const int64_t across = ((int64_t)rows.bv[k] * w.ax - (int64_t)rows.bu[k] * w.ay) >> (set->one_bits + 1u);
@@ -247,8 +250,8 @@ static void add_up(const paper_t *e, const ego_frame_t *f, const ego_turn_t *tur
         }
         unsigned at = 0u;
         for (unsigned k = 0u; k < DIM; k++) {
-            const int32_t wj = ego_weigh(weight_q30, inv, j[k]);
-            sums->z[ego_cell(set, &p)][k] += ego_gradient(wr_q2, j[k]);
+            const int32_t wj = evs_ego_weigh(weight_q30, inv, j[k]);
+            sums->z[evs_ego_cell(set, &p)][k] += evs_ego_gradient(wr_q2, j[k]);
             for (unsigned l = 0u; l <= k; l++) { sums->h[at++] += (int64_t)wj * j[l]; }
         }
     }
@@ -257,15 +260,15 @@ static void add_up(const paper_t *e, const ego_frame_t *f, const ego_turn_t *tur
 /* --- the estimate ----------------------------------------------------------------------------------------------- */
 
 /* The published cost knows no sign: the one for which more of the weight has a positive inverse depth. */
-static bool points_back(const paper_t *e, evs_vec3_t v_q30, const ego_turn_t *turn)
+static bool points_back(const paper_t *e, evs_vec3_t v_q30, const evs_ego_turn_t *turn)
 {
-    const ego_dir_t dir = ego_dir(e->set, v_q30);
+    const evs_ego_dir_t dir = evs_ego_dir(e->set, v_q30);
     int64_t votes = 0;
     for (uint32_t i = 0u; i < e->set->n; i++) {
-        const ego_rows_t rows = ego_rows(e->set, &e->set->vec[i]);
+        const evs_ego_rows_t rows = evs_ego_rows(e->set, &e->set->vec[i]);
         int32_t left[2];
-        ego_left_over(e->set, &e->set->vec[i], &rows, turn, left);
-        const ego_view_t w = ego_view(&e->set->vec[i], dir);
+        evs_ego_left_over(e->set, &e->set->vec[i], &rows, turn, left);
+        const evs_ego_view_t w = evs_ego_view(&e->set->vec[i], dir);
         const int64_t d = (int64_t)left[0] * w.ax + (int64_t)left[1] * w.ay;
         votes += (d > 0) ? (int64_t)weight_q15(e, i) : ((d < 0) ? -(int64_t)weight_q15(e, i) : 0);
     }
@@ -274,18 +277,18 @@ static bool points_back(const paper_t *e, evs_vec3_t v_q30, const ego_turn_t *tu
 
 static int32_t turn_to_rad_q28(const evs_egomotion_result_t *scale, int32_t w_q8)
 {
-    const evs_scaled_t step = evs_scaled((int64_t)scale->median_flow_q24, -24 - EGO_MEDIAN_BITS);
-    return evs_clamp(evs_scaled_to_q(evs_scaled_mul(evs_scaled(w_q8, -8), step), 28), -EGO_ROTATION_MAX,
-                     EGO_ROTATION_MAX);
+    const evs_scaled_t step = evs_scaled((int64_t)scale->median_flow_q24, -24 - EVS_EGO_MEDIAN_BITS);
+    return evs_clamp(evs_scaled_to_q(evs_scaled_mul(evs_scaled(w_q8, -8), step), 28), -EVS_EGO_ROTATION_MAX,
+                     EVS_EGO_ROTATION_MAX);
 }
 
-bool ego_paper(const ego_set_t *set, bool joint, uint32_t *likelihood, evs_egomotion_result_t *result,
-               evs_scaled_t cov[3])
+bool evs_ego_paper(const evs_ego_set_t *set, bool joint, uint32_t *likelihood, evs_egomotion_result_t *result,
+                   evs_scaled_t cov[3])
 {
     paper_t e = {.set = set, .likelihood = likelihood, .joint = joint, .weighted = false};
     const unsigned dim = joint ? 5u : 2u;
     uint64_t least;
-    ego_turn_t turn;
+    evs_ego_turn_t turn;
     make_weights(&e);
     evs_vec3_t v = search_grid(&e, &least);
     v = downhill(&e, v, least);
@@ -297,16 +300,16 @@ bool ego_paper(const ego_set_t *set, bool joint, uint32_t *likelihood, evs_egomo
             (evs_vec3_t){turn_to_rad_q28(result, turn.w_q8[0]), turn_to_rad_q28(result, turn.w_q8[1]),
                          turn_to_rad_q28(result, turn.w_q8[2])};
     }
-    const ego_frame_t f = ego_frame(v);
+    const evs_ego_frame_t f = evs_ego_frame(v);
     sums_t sums;
     evs_scaled_t h[N_TRIANGLE];
     evs_scaled_t m[N_TRIANGLE];
-    int64_t z[EGO_CELLS * DIM];
+    int64_t z[EVS_EGO_CELLS * DIM];
     add_up(&e, &f, &turn, &sums);
     for (unsigned k = 0u; k < N_TRIANGLE; k++) { h[k] = evs_scaled(sums.h[k], 0); }
-    for (unsigned c = 0u; c < EGO_CELLS; c++) {
+    for (unsigned c = 0u; c < EVS_EGO_CELLS; c++) {
         for (unsigned k = 0u; k < dim; k++) { z[c * dim + k] = sums.z[c][k]; }
     }
-    ego_spread(z, dim, m);
-    return ego_sandwich(h, m, dim, cov);
+    evs_ego_spread(z, dim, m);
+    return evs_ego_sandwich(h, m, dim, cov);
 }

@@ -13,7 +13,7 @@ static evs_vec3_t unit_or(evs_vec3_t v, evs_vec3_t otherwise)
     return (evs_vec3_normalize(v, &unit) == EVS_OK) ? unit : otherwise;
 }
 
-ego_frame_t ego_frame(evs_vec3_t v)
+evs_ego_frame_t evs_ego_frame(evs_vec3_t v)
 {
     const uint32_t x = evs_abs_u32(v.x);
     const uint32_t y = evs_abs_u32(v.y);
@@ -22,7 +22,7 @@ ego_frame_t ego_frame(evs_vec3_t v)
     const bool y_least = !x_least && (y <= z);
     const evs_vec3_t axis = {x_least ? EVS_ONE_Q30 : 0, y_least ? EVS_ONE_Q30 : 0,
                              (!x_least && !y_least) ? EVS_ONE_Q30 : 0};
-    ego_frame_t f;
+    evs_ego_frame_t f;
     f.v = v;
     f.b0 = unit_or(evs_vec3_cross(v, axis, 30u), axis);
     f.b1 = evs_vec3_cross(v, f.b0, 30u);
@@ -32,7 +32,7 @@ ego_frame_t ego_frame(evs_vec3_t v)
 /* Half a radian at most, Q30: far steps of a linear model mean nothing. */
 #define STEP_MAX_Q30 (INT32_C(1) << 29)
 
-evs_vec3_t ego_move(const ego_frame_t *f, evs_scaled_t d0, evs_scaled_t d1)
+evs_vec3_t evs_ego_move(const evs_ego_frame_t *f, evs_scaled_t d0, evs_scaled_t d1)
 {
     const int32_t s0 = evs_clamp(evs_scaled_to_q(d0, 30), -STEP_MAX_Q30, STEP_MAX_Q30) / 2; /* halves: the sum below */
     const int32_t s1 = evs_clamp(evs_scaled_to_q(d1, 30), -STEP_MAX_Q30, STEP_MAX_Q30) / 2; /* stays under 2^31 */
@@ -44,24 +44,24 @@ evs_vec3_t ego_move(const ego_frame_t *f, evs_scaled_t d0, evs_scaled_t d1)
 
 /* --- residuals -------------------------------------------------------------------------------------------------- */
 
-ego_scale_t ego_scale(uint32_t s)
+evs_ego_scale_t evs_ego_scale(uint32_t s)
 {
     const unsigned e = 31u - evs_clz32(s);
-    const ego_scale_t scale = {(s * s) << (28u - 2u * e), e + 2u};
+    const evs_ego_scale_t scale = {(s * s) << (28u - 2u * e), e + 2u};
     return scale;
 }
 
 /* --- steps ------------------------------------------------------------------------------------------------------ */
 
-bool ego_step(const ego_set_t *set, uint32_t s, uint32_t stride, evs_vec3_t *v_q30)
+bool evs_ego_step(const evs_ego_set_t *set, uint32_t s, uint32_t stride, evs_vec3_t *v_q30)
 {
-    const ego_frame_t f = ego_frame(*v_q30);
-    const ego_loop_t loop = ego_loop(set, &f, s);
+    const evs_ego_frame_t f = evs_ego_frame(*v_q30);
+    const evs_ego_loop_t loop = evs_ego_loop(set, &f, s);
     int64_t h00 = 0, h01 = 0, h11 = 0; /* sum of w J J': the Hessian of Gauss-Newton */
     int64_t g0_q2 = 0, g1_q2 = 0;      /* sum of w r J: the gradient */
     for (uint32_t i = 0u; i < set->n; i += stride) {
-        ego_pull_t a;
-        if (!ego_pull(set, &set->vec[i], &loop, &a)) { continue; }
+        evs_ego_pull_t a;
+        if (!evs_ego_pull(set, &set->vec[i], &loop, &a)) { continue; }
         h00 += (int64_t)a.k0 * a.j.j0;
         h01 += (int64_t)a.k0 * a.j.j1;
         h11 += (int64_t)a.k1 * a.j.j1;
@@ -71,25 +71,25 @@ bool ego_step(const ego_set_t *set, uint32_t s, uint32_t stride, evs_vec3_t *v_q
     evs_scaled_t h[3] = {evs_scaled(h00, 0), evs_scaled(h01, 0), evs_scaled(h11, 0)};
     evs_scaled_t step[2] = {evs_scaled(-g0_q2, -2), evs_scaled(-g1_q2, -2)};
     if (!evs_scaled_solve(h, step, 2u)) { return false; }
-    *v_q30 = ego_move(&f, step[0], step[1]);
+    *v_q30 = evs_ego_move(&f, step[0], step[1]);
     return true;
 }
 
-uint32_t ego_noise(const ego_set_t *set, evs_vec3_t v_q30, uint32_t n_max)
+uint32_t evs_ego_noise(const evs_ego_set_t *set, evs_vec3_t v_q30, uint32_t n_max)
 {
-    const ego_dir_t dir = ego_dir(set, v_q30);
+    const evs_ego_dir_t dir = evs_ego_dir(set, v_q30);
     const uint32_t stride = (set->n + n_max - 1u) / n_max;
     uint32_t m = 0u;
     for (uint32_t i = 0u; i < set->n; i += stride) {
-        const ego_view_t w = ego_view(&set->vec[i], dir);
-        if (ego_near_focus(set, &w)) { continue; }
-        const int32_t r_per_a_q2 = ego_over_a2_q2(set, w.c, ego_inv_a2(set, w.a2));
-        set->key[m++] = ego_key((uint64_t)((int64_t)w.c * r_per_a_q2) >> (set->one_bits - 2u)); /* 16 r^2 */
+        const evs_ego_view_t w = evs_ego_view(&set->vec[i], dir);
+        if (evs_ego_near_focus(set, &w)) { continue; }
+        const int32_t r_per_a_q2 = evs_ego_over_a2_q2(set, w.c, evs_ego_inv_a2(set, w.a2));
+        set->key[m++] = evs_ego_key((uint64_t)((int64_t)w.c * r_per_a_q2) >> (set->one_bits - 2u)); /* 16 r^2 */
     }
-    if (m == 0u) { return EGO_CLIP; }
+    if (m == 0u) { return EVS_EGO_CLIP; }
     /* The lower quartile instead of the median: |r| of a normal distribution lies below 0.3186 sigma for a quarter. With half
      * of the vectors outliers it still falls among the good ones. 3.1383 = 1 / 0.3186, and 4 = sqrt(16). */
-    const uint64_t r2_q4 = ego_key_value(ego_select(set->key, m, m / 4u));
+    const uint64_t r2_q4 = evs_ego_key_value(evs_ego_select(set->key, m, m / 4u));
     return (uint32_t)(((uint64_t)evs_sqrt_u64(r2_q4 << 16) * 205672u) >> 26);
 }
 
@@ -109,11 +109,11 @@ static evs_scaled_t form(const evs_scaled_t *m, const evs_scaled_t *x, const evs
     return sum;
 }
 
-void ego_spread(const int64_t *z, unsigned dim, evs_scaled_t *m)
+void evs_ego_spread(const int64_t *z, unsigned dim, evs_scaled_t *m)
 {
     int32_t n_used = 0;
     for (unsigned i = 0u; i < dim * (dim + 1u) / 2u; i++) { m[i] = evs_scaled(0, 0); }
-    for (unsigned c = 0u; c < EGO_CELLS; c++, z += dim) {
+    for (unsigned c = 0u; c < EVS_EGO_CELLS; c++, z += dim) {
         unsigned k = 0u;
         int64_t any = 0;
         for (unsigned i = 0u; i < dim; i++) {
@@ -130,7 +130,7 @@ void ego_spread(const int64_t *z, unsigned dim, evs_scaled_t *m)
     for (unsigned i = 0u; i < dim * (dim + 1u) / 2u; i++) { m[i] = evs_scaled_mul(m[i], correction); }
 }
 
-bool ego_sandwich(const evs_scaled_t *h, const evs_scaled_t *m, unsigned dim, evs_scaled_t cov[3])
+bool evs_ego_sandwich(const evs_scaled_t *h, const evs_scaled_t *m, unsigned dim, evs_scaled_t cov[3])
 {
     evs_scaled_t x[2][EVS_SCALED_DIM_MAX] = {{{0, 0}}};
     for (unsigned i = 0u; i < 2u; i++) { /* the first two columns of H^-1 */
@@ -145,23 +145,23 @@ bool ego_sandwich(const evs_scaled_t *h, const evs_scaled_t *m, unsigned dim, ev
     return true;
 }
 
-bool ego_covariance(const ego_set_t *set, const ego_frame_t *f, uint32_t s, evs_scaled_t cov[3])
+bool evs_ego_covariance(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint32_t s, evs_scaled_t cov[3])
 {
-    const ego_loop_t loop = ego_loop(set, f, s);
+    const evs_ego_loop_t loop = evs_ego_loop(set, f, s);
     int64_t h00 = 0, h01 = 0, h11 = 0;
-    int64_t curvature = 0;           /* sum of psi' |J|^2: the trace of the true Hessian */
-    int64_t z[EGO_CELLS][2] = {{0}}; /* the gradient, by cells */
-    uint64_t spread = 0u;            /* sum of its squares, vector by vector */
+    int64_t curvature = 0;               /* sum of psi' |J|^2: the trace of the true Hessian */
+    int64_t z[EVS_EGO_CELLS][2] = {{0}}; /* the gradient, by cells */
+    uint64_t spread = 0u;                /* sum of its squares, vector by vector */
     for (uint32_t i = 0u; i < set->n; i++) {
-        ego_pull_t a;
-        if (!ego_pull(set, &set->vec[i], &loop, &a)) { continue; }
+        evs_ego_pull_t a;
+        if (!evs_ego_pull(set, &set->vec[i], &loop, &a)) { continue; }
         h00 += (int64_t)a.k0 * a.j.j0;
         h01 += (int64_t)a.k0 * a.j.j1;
         h11 += (int64_t)a.k1 * a.j.j1;
-        curvature += (int64_t)ego_bend(&a, a.k0) * a.j.j0 + (int64_t)ego_bend(&a, a.k1) * a.j.j1;
-        const int32_t z0 = ego_gradient(a.wr_q2, a.j.j0);
-        const int32_t z1 = ego_gradient(a.wr_q2, a.j.j1);
-        int64_t *const cell = z[ego_cell(set, &set->vec[i])];
+        curvature += (int64_t)evs_ego_bend(&a, a.k0) * a.j.j0 + (int64_t)evs_ego_bend(&a, a.k1) * a.j.j1;
+        const int32_t z0 = evs_ego_gradient(a.wr_q2, a.j.j0);
+        const int32_t z1 = evs_ego_gradient(a.wr_q2, a.j.j1);
+        int64_t *const cell = z[evs_ego_cell(set, &set->vec[i])];
         cell[0] += z0;
         cell[1] += z1;
         spread += (uint64_t)((int64_t)z0 * z0) + (uint64_t)((int64_t)z1 * z1);
@@ -173,7 +173,7 @@ bool ego_covariance(const ego_set_t *set, const ego_frame_t *f, uint32_t s, evs_
     const evs_scaled_t h[3] = {evs_scaled_mul(evs_scaled(h00, 0), kappa), evs_scaled_mul(evs_scaled(h01, 0), kappa),
                                evs_scaled_mul(evs_scaled(h11, 0), kappa)};
     evs_scaled_t m[3];
-    ego_spread(&z[0][0], 2u, m);
+    evs_ego_spread(&z[0][0], 2u, m);
     /* cells are few: should chance have made their sums small, believe the vectors */
     const evs_scaled_t at_least = evs_scaled((int64_t)(spread >> 1), 5);
     const evs_scaled_t trace = evs_scaled_add(m[0], m[2]);
@@ -181,5 +181,5 @@ bool ego_covariance(const ego_set_t *set, const ego_frame_t *f, uint32_t s, evs_
         const evs_scaled_t more = evs_scaled_div(at_least, trace);
         for (unsigned i = 0u; i < 3u; i++) { m[i] = evs_scaled_mul(m[i], more); }
     }
-    return ego_sandwich(h, m, 2u, cov);
+    return evs_ego_sandwich(h, m, 2u, cov);
 }

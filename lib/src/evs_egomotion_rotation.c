@@ -8,58 +8,58 @@ enum { DIM = 5, N_TRIANGLE = DIM * (DIM + 1) / 2, SLOPE_MAX = (1 << 18) - 1 };
 /* --- joint steps ------------------------------------------------------------------------------------------------ */
 
 typedef struct {
-    int64_t h[N_TRIANGLE];     /* sum of w J J' */
-    int64_t g_q2[DIM];         /* sum of w r J */
-    int64_t z[EGO_CELLS][DIM]; /* the same by cells, in 4 steps^2 */
-    int64_t curvature;         /* sum of psi' |J|^2 over the two of v */
+    int64_t h[N_TRIANGLE];         /* sum of w J J' */
+    int64_t g_q2[DIM];             /* sum of w r J */
+    int64_t z[EVS_EGO_CELLS][DIM]; /* the same by cells, in 4 steps^2 */
+    int64_t curvature;             /* sum of psi' |J|^2 over the two of v */
 } sums_t;
 
-static void add_up(const ego_set_t *set, const ego_frame_t *f, uint32_t s, sums_t *sums)
+static void add_up(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint32_t s, sums_t *sums)
 {
-    const ego_loop_t loop = ego_loop(set, f, s);
+    const evs_ego_loop_t loop = evs_ego_loop(set, f, s);
     *sums = (sums_t){.curvature = 0};
     for (uint32_t i = 0u; i < set->n; i++) {
-        const ego_vector_t *const p = &set->vec[i];
-        ego_pull_t a;
-        if (!ego_pull(set, p, &loop, &a)) { continue; }
-        const ego_rows_t rows = ego_rows(set, p);
+        const evs_ego_vector_t *const p = &set->vec[i];
+        evs_ego_pull_t a;
+        if (!evs_ego_pull(set, p, &loop, &a)) { continue; }
+        const evs_ego_rows_t rows = evs_ego_rows(set, p);
         int32_t j[DIM] = {a.j.j0, a.j.j1, 0, 0, 0};
         for (unsigned k = 0u; k < 3u; k++) {
             const int64_t across =
                 ((int64_t)rows.bv[k] * a.view.ax - (int64_t)rows.bu[k] * a.view.ay) >> (set->one_bits + 1u);
             j[2u + k] = evs_clamp(evs_sat32(across), -SLOPE_MAX, SLOPE_MAX);
         }
-        int64_t *const cell = sums->z[ego_cell(set, p)];
+        int64_t *const cell = sums->z[evs_ego_cell(set, p)];
         unsigned at = 0u;
         for (unsigned k = 0u; k < DIM; k++) {
-            const int32_t wj = ego_weigh(a.weight_q30, a.inv, j[k]);
-            cell[k] += ego_gradient(a.wr_q2, j[k]);
+            const int32_t wj = evs_ego_weigh(a.weight_q30, a.inv, j[k]);
+            cell[k] += evs_ego_gradient(a.wr_q2, j[k]);
             sums->g_q2[k] += (int64_t)a.wr_q2 * j[k];
             for (unsigned l = 0u; l <= k; l++) { sums->h[at++] += (int64_t)wj * j[l]; }
-            if (k < 2u) { sums->curvature += (int64_t)ego_bend(&a, wj) * j[k]; }
+            if (k < 2u) { sums->curvature += (int64_t)evs_ego_bend(&a, wj) * j[k]; }
         }
     }
 }
 
 /* The rotation is counted in 2^one_bits steps per unit, as its slopes are; to rad: */
-evs_scaled_t ego_rotation_unit(const ego_set_t *set, const evs_egomotion_result_t *scale)
+evs_scaled_t evs_ego_rotation_unit(const evs_ego_set_t *set, const evs_egomotion_result_t *scale)
 {
-    return evs_scaled((int64_t)scale->median_flow_q24, (int32_t)set->one_bits - 24 - EGO_MEDIAN_BITS);
+    return evs_scaled((int64_t)scale->median_flow_q24, (int32_t)set->one_bits - 24 - EVS_EGO_MEDIAN_BITS);
 }
 
-evs_scaled_t ego_rotation_prior(const ego_set_t *set, const evs_egomotion_result_t *scale, uint32_t noise,
-                                int32_t sigma_rad_q28)
+evs_scaled_t evs_ego_rotation_prior(const evs_ego_set_t *set, const evs_egomotion_result_t *scale, uint32_t noise,
+                                    int32_t sigma_rad_q28)
 {
-    const evs_scaled_t sigma = evs_scaled_div(evs_scaled(sigma_rad_q28, -28), ego_rotation_unit(set, scale));
+    const evs_scaled_t sigma = evs_scaled_div(evs_scaled(sigma_rad_q28, -28), evs_ego_rotation_unit(set, scale));
     const evs_scaled_t ratio = evs_scaled_div(evs_scaled((int64_t)noise + 1, 0), sigma);
     return evs_scaled_mul(ratio, ratio);
 }
 
-bool ego_step_rotation(const ego_set_t *set, const evs_egomotion_result_t *scale, uint32_t s, evs_vec3_t *v_q30,
-                       ego_rotation_t *rot)
+bool evs_ego_step_rotation(const evs_ego_set_t *set, const evs_egomotion_result_t *scale, uint32_t s, evs_vec3_t *v_q30,
+                           evs_ego_rotation_t *rot)
 {
-    const ego_frame_t f = ego_frame(*v_q30);
-    const evs_scaled_t unit = ego_rotation_unit(set, scale);
+    const evs_ego_frame_t f = evs_ego_frame(*v_q30);
+    const evs_scaled_t unit = evs_ego_rotation_unit(set, scale);
     const int32_t now[3] = {rot->rad_q28.x, rot->rad_q28.y, rot->rad_q28.z};
     sums_t sums;
     evs_scaled_t h[N_TRIANGLE];
@@ -74,18 +74,18 @@ bool ego_step_rotation(const ego_set_t *set, const evs_egomotion_result_t *scale
         step[2u + k] = evs_scaled_sub(step[2u + k], evs_scaled_mul(rot->prior, found));
     }
     if (!evs_scaled_solve(h, step, DIM)) { return false; }
-    *v_q30 = ego_move(&f, step[0], step[1]);
+    *v_q30 = evs_ego_move(&f, step[0], step[1]);
     int32_t next[3];
     for (unsigned k = 0u; k < 3u; k++) {
         const int64_t sum = (int64_t)now[k] + evs_scaled_to_q(evs_scaled_mul(step[2u + k], unit), 28);
-        next[k] = evs_clamp(evs_sat32(sum), -EGO_ROTATION_MAX, EGO_ROTATION_MAX);
+        next[k] = evs_clamp(evs_sat32(sum), -EVS_EGO_ROTATION_MAX, EVS_EGO_ROTATION_MAX);
     }
     rot->rad_q28 = (evs_vec3_t){next[0], next[1], next[2]};
     return true;
 }
 
-bool ego_covariance_rotation(const ego_set_t *set, const ego_frame_t *f, uint32_t s, uint32_t noise, evs_scaled_t prior,
-                             evs_scaled_t cov[3])
+bool evs_ego_covariance_rotation(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint32_t s, uint32_t noise,
+                                 evs_scaled_t prior, evs_scaled_t cov[3])
 {
     sums_t sums;
     evs_scaled_t h[N_TRIANGLE];
@@ -94,14 +94,14 @@ bool ego_covariance_rotation(const ego_set_t *set, const ego_frame_t *f, uint32_
     if (sums.curvature <= 0) { return false; }
     const evs_scaled_t kappa = evs_scaled_div(evs_scaled(sums.curvature, 0), evs_scaled(sums.h[0] + sums.h[2], 0));
     for (unsigned i = 0u; i < N_TRIANGLE; i++) { h[i] = evs_scaled_mul(evs_scaled(sums.h[i], 0), kappa); }
-    ego_spread(&sums.z[0][0], DIM, m);
+    evs_ego_spread(&sums.z[0][0], DIM, m);
     const evs_scaled_t of_prior = evs_scaled_mul(prior, evs_scaled((int64_t)noise * noise + 1, 0));
     for (unsigned k = 0u; k < 3u; k++) {
         const unsigned at = (2u + k) * (3u + k) / 2u + 2u + k;
         h[at] = evs_scaled_add(h[at], prior);
         m[at] = evs_scaled_add(m[at], of_prior);
     }
-    return ego_sandwich(h, m, DIM, cov);
+    return evs_ego_sandwich(h, m, DIM, cov);
 }
 
 /* --- is it all rotation? ---------------------------------------------------------------------------------------- */
@@ -114,15 +114,15 @@ static uint32_t ratio_q15(uint32_t a, uint32_t b)
 }
 
 /* One weighted least-squares solution for the turn, weights from the last one. */
-static bool fit_turn(const ego_set_t *set, uint32_t stride, uint32_t s2, ego_turn_t *t)
+static bool fit_turn(const evs_ego_set_t *set, uint32_t stride, uint32_t s2, evs_ego_turn_t *t)
 {
     int64_t h[6] = {0};
     int64_t g[3] = {0};
     for (uint32_t i = 0u; i < set->n; i += stride) {
-        const ego_vector_t *const p = &set->vec[i];
-        const ego_rows_t r = ego_rows(set, p);
+        const evs_ego_vector_t *const p = &set->vec[i];
+        const evs_ego_rows_t r = evs_ego_rows(set, p);
         int32_t left[2];
-        ego_left_over(set, p, &r, t, left);
+        evs_ego_left_over(set, p, &r, t, left);
         const uint32_t e = (uint32_t)(left[0] * left[0]) + (uint32_t)(left[1] * left[1]);
         const uint32_t share = ratio_q15(s2, s2 + (e >> 1));
         const int32_t weight_q8 = (int32_t)((share * share) >> 22);
@@ -141,16 +141,16 @@ static bool fit_turn(const ego_set_t *set, uint32_t stride, uint32_t s2, ego_tur
     if (!evs_scaled_solve(a, x, 3u)) { return false; }
     for (unsigned k = 0u; k < 3u; k++) {
         const int64_t w = (int64_t)t->w_q8[k] + evs_scaled_to_q(x[k], 8);
-        t->w_q8[k] = evs_clamp(evs_sat32(w), -EGO_TURN_MAX, EGO_TURN_MAX);
+        t->w_q8[k] = evs_clamp(evs_sat32(w), -EVS_EGO_TURN_MAX, EVS_EGO_TURN_MAX);
     }
     return true;
 }
 
 /* Fit a turn to every stride-th vector, at the scales of the median flow, half of it, and twice s. */
-static bool find_turn(const ego_set_t *set, uint32_t stride, uint32_t s, ego_turn_t *t)
+static bool find_turn(const evs_ego_set_t *set, uint32_t stride, uint32_t s, evs_ego_turn_t *t)
 {
     for (unsigned i = 0u; i < 4u; i++) {
-        const uint32_t wide = (UINT32_C(1) << EGO_MEDIAN_BITS) >> i;
+        const uint32_t wide = (UINT32_C(1) << EVS_EGO_MEDIAN_BITS) >> i;
         const uint32_t scale = ((i < 2u) && (wide > s)) ? wide : s;
         if (!fit_turn(set, stride, scale * scale, t)) { return false; }
     }
@@ -173,21 +173,21 @@ static void explain(explained_t *x, uint32_t share, uint32_t by_chance)
 }
 
 /* By how much v explains more of the vectors than a turn does, Q15. */
-static int32_t lead_over_turn(const ego_set_t *set, uint32_t stride, evs_vec3_t v_q30, uint32_t s)
+static int32_t lead_over_turn(const evs_ego_set_t *set, uint32_t stride, evs_vec3_t v_q30, uint32_t s)
 {
-    ego_turn_t t = {{0, 0, 0}};
+    evs_ego_turn_t t = {{0, 0, 0}};
     if (!find_turn(set, stride, s, &t)) { return INT32_MAX; }
-    const ego_dir_t dir = ego_dir(set, v_q30);
-    const ego_scale_t kernel = ego_scale(s);
+    const evs_ego_dir_t dir = evs_ego_dir(set, v_q30);
+    const evs_ego_scale_t kernel = evs_ego_scale(s);
     const uint32_t s2 = s * s;
     explained_t by_v = {0, 1};
     explained_t by_turn = {0, 1};
     for (uint32_t i = 0u; i < set->n; i += stride) {
-        const ego_vector_t *const p = &set->vec[i];
-        const ego_view_t w = ego_view(p, dir);
-        const ego_rows_t r = ego_rows(set, p);
+        const evs_ego_vector_t *const p = &set->vec[i];
+        const evs_ego_view_t w = evs_ego_view(p, dir);
+        const evs_ego_rows_t r = evs_ego_rows(set, p);
         int32_t left[2];
-        ego_left_over(set, p, &r, &t, left);
+        evs_ego_left_over(set, p, &r, &t, left);
         const int32_t turned[2] = {p->u - left[0], p->v - left[1]};
         const uint32_t e = (uint32_t)(left[0] * left[0]) + (uint32_t)(left[1] * left[1]);
         const uint64_t u2 = (uint64_t)(p->u * p->u + p->v * p->v);
@@ -196,7 +196,7 @@ static int32_t lead_over_turn(const ego_set_t *set, uint32_t stride, evs_vec3_t 
         const uint64_t a = s2 + ((u2 + b2) >> 1);
         const uint32_t chance_v = ratio_q15(s, evs_sqrt_u64(s2 + u2)) / 2u; /* and half point the wrong way */
         const uint32_t chance_turn = ratio_q15(s2, evs_sqrt_u64(a * a - u2 * b2));
-        explain(&by_v, (w.d > 0) ? ego_share_q15(kernel, &w) : 0u, chance_v);
+        explain(&by_v, (w.d > 0) ? evs_ego_share_q15(kernel, &w) : 0u, chance_v);
         explain(&by_turn, ratio_q15(s2, s2 + (e >> 1)), chance_turn);
     }
     const evs_scaled_t lead =
@@ -205,7 +205,7 @@ static int32_t lead_over_turn(const ego_set_t *set, uint32_t stride, evs_vec3_t 
     return evs_scaled_to_q(lead, 15);
 }
 
-bool ego_is_rotation(const ego_set_t *set, evs_vec3_t v_q30, uint32_t s)
+bool evs_ego_is_rotation(const evs_ego_set_t *set, evs_vec3_t v_q30, uint32_t s)
 {
     enum { CLEAR_Q15 = 10000, FEW = 64, MORE = 512 }; /* a lead of 0.3 needs no second look */
     const uint32_t coarse = (set->n + FEW - 1u) / FEW;

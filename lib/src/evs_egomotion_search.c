@@ -23,14 +23,14 @@ static const int16_t HEMISPHERE[N_HYPOTHESES][3] = {
 };
 
 /* Every so many of the vectors, so that they come from all over the list. */
-static uint32_t pick(const ego_set_t *set)
+static uint32_t pick(const evs_ego_set_t *set)
 {
-    const uint32_t n = (set->n < EGO_SUBSET) ? set->n : EGO_SUBSET;
+    const uint32_t n = (set->n < EVS_EGO_SUBSET) ? set->n : EVS_EGO_SUBSET;
     const uint32_t stride_q16 = (set->n << 16) / n; /* n <= 65535 */
-    ego_subset_t *const s = set->subset;
+    evs_ego_subset_t *const s = set->subset;
     uint32_t at_q16 = 0u;
     for (uint32_t i = 0u; i < n; i++, at_q16 += stride_q16) {
-        const ego_vector_t p = set->vec[at_q16 >> 16];
+        const evs_ego_vector_t p = set->vec[at_q16 >> 16];
         s->x[i] = p.x;
         s->y[i] = p.y;
         s->u[i] = p.u;
@@ -42,7 +42,7 @@ static uint32_t pick(const ego_set_t *set)
 /* How many vectors fit a direction and its opposite: the residual is below 0.35 of the median flow (the root of 1/8), the
  * inverse depth positive. A plain count spares a division per vector and hypothesis; the accuracy in the end is that of a
  * smooth kernel, and where an object moves by itself a narrow count is better. */
-static void score(const ego_subset_t *s, uint32_t n, ego_dir_t dir, uint32_t points[2])
+static void score(const evs_ego_subset_t *s, uint32_t n, evs_ego_dir_t dir, uint32_t points[2])
 {
     uint32_t all = 0u;
     uint32_t forward = 0u;
@@ -61,7 +61,7 @@ static void score(const ego_subset_t *s, uint32_t n, ego_dir_t dir, uint32_t poi
     points[1] = all - forward;
 }
 
-evs_vec3_t ego_search(const ego_set_t *set)
+evs_vec3_t evs_ego_search(const evs_ego_set_t *set)
 {
     const uint32_t n = pick(set);
     uint32_t most = 0u;
@@ -69,7 +69,7 @@ evs_vec3_t ego_search(const ego_set_t *set)
     for (int h = 0; h < N_HYPOTHESES; h++) {
         const evs_vec3_t v = {HEMISPHERE[h][0] * 65536, HEMISPHERE[h][1] * 65536, HEMISPHERE[h][2] * 65536};
         uint32_t points[2];
-        score(set->subset, n, ego_dir(set, v), points);
+        score(set->subset, n, evs_ego_dir(set, v), points);
         if (points[0] > most) {
             most = points[0];
             best = v;
