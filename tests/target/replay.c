@@ -191,6 +191,7 @@ void replay_print(const replay_result_t *r)
     printf("stabilized  %08lx\n", (unsigned long)r->stabilized);
     printf("iwe         %08lx\n", (unsigned long)r->images.iwe);
     printf("surface     %08lx\n", (unsigned long)r->images.surface);
+    printf("warp        %08lx\n", (unsigned long)r->images.warp);
     printf("directions  %lu\n", (unsigned long)r->n_directions);
     printf("velocity    %08lx\n", (unsigned long)r->velocity);
     printf("counters    %08lx\n", (unsigned long)r->counts);

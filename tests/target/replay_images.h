@@ -12,6 +12,7 @@
 typedef struct {
     uint32_t iwe;     /**< CRC-32 of images by nearest and by Gaussian votes, and of half of them. */
     uint32_t surface; /**< CRC-32 of images with and without polarity. */
+    uint32_t warp;    /**< CRC-32 of contrast maximization: both kinds, each with another cost, and moved events. */
 } replay_images_t;
 
 /** Begin anew; the images go on from one recording to the next otherwise. Returns false when a setting is refused. */
