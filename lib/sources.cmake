@@ -20,6 +20,7 @@ set(EVS_SOURCES
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_fixed.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow_grid.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow_mve.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow_pairs.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow_plain.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow_sse2.c

@@ -60,11 +60,18 @@ void evs_flow_template_pairs(evs_flow_t *flow, evs_flow_place_t at, evs_flow_tex
 void evs_flow_pull_pairs(const evs_flow_t *flow, evs_flow_place_t at, evs_flow_pull_t *pull);
 uint32_t evs_flow_difference_pairs(const evs_flow_t *flow, evs_flow_place_t at);
 
+/* Eight samples at a time: Helium. */
+void evs_flow_template_mve(evs_flow_t *flow, evs_flow_place_t at, evs_flow_texture_t *texture);
+void evs_flow_pull_mve(const evs_flow_t *flow, evs_flow_place_t at, evs_flow_pull_t *pull);
+uint32_t evs_flow_difference_mve(const evs_flow_t *flow, evs_flow_place_t at);
+
 /* The one of this build. */
 static inline void evs_flow_template(evs_flow_t *flow, evs_flow_place_t at, evs_flow_texture_t *texture)
 {
 #if EVS_SIMD_X86
     evs_flow_template_sse2(flow, at, texture);
+#elif EVS_SIMD_MVE
+    evs_flow_template_mve(flow, at, texture);
 #else
     if (flow->cfg.stride_px == 2u) {
         evs_flow_template_pairs(flow, at, texture);
@@ -77,6 +84,8 @@ static inline void evs_flow_pull(const evs_flow_t *flow, evs_flow_place_t at, ev
 {
 #if EVS_SIMD_X86
     evs_flow_pull_sse2(flow, at, pull);
+#elif EVS_SIMD_MVE
+    evs_flow_pull_mve(flow, at, pull);
 #else
     if (flow->cfg.stride_px == 2u) {
         evs_flow_pull_pairs(flow, at, pull);
@@ -89,6 +98,8 @@ static inline uint32_t evs_flow_difference(const evs_flow_t *flow, evs_flow_plac
 {
 #if EVS_SIMD_X86
     return evs_flow_difference_sse2(flow, at);
+#elif EVS_SIMD_MVE
+    return evs_flow_difference_mve(flow, at);
 #else
     return (flow->cfg.stride_px == 2u) ? evs_flow_difference_pairs(flow, at) : evs_flow_difference_plain(flow, at);
 #endif
