@@ -40,9 +40,9 @@ evs_status_t evs_pyramid_build(evs_pyramid_t *pyramid, const evs_image_t *image,
 
 evs_flow_config_t evs_flow_config_default(void)
 {
-    const evs_flow_config_t cfg = {.window_px = 31u,
+    const evs_flow_config_t cfg = {.window_px = 25u,
                                    .stride_px = 2u,
-                                   .n_iterations = 3u,
+                                   .n_iterations = 5u,
                                    .epsilon_q8 = 3u,
                                    .min_eigen_q8 = 26u,
                                    .max_backward_q8 = 128u};

@@ -18,7 +18,7 @@ enum { W = 240, H = 180, CELL = 16, LEVELS = 2 };
 static uint8_t px[2][W * H];
 static uint8_t levels[2][EVS_PYRAMID_BYTES(W, H, LEVELS)];
 static uint32_t corners_memory[(EVS_CORNERS_BYTES(W, H, CELL) + 3u) / 4u];
-static uint32_t flow_memory[(EVS_FLOW_BYTES(31, 2) + 3u) / 4u];
+static uint32_t flow_memory[(EVS_FLOW_BYTES(25, 2) + 3u) / 4u];
 static evs_corner_t found[BENCH_TRACKS];
 static evs_flow_track_t tracks[BENCH_TRACKS];
 

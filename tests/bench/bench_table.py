@@ -69,7 +69,7 @@ PER_UPDATE = [
 ]
 PER_IMAGE = [  # (row, region, how many there are in it)
     ("corners of an image of 240×180", "CORNERS", "ONE"),
-    ("flow: a corner tracked, 31 px, every 2nd, 2 levels, there and back", "TRACK_ALL", "TRACKS"),
+    ("flow: a corner tracked, default settings, 2 levels", "TRACK_ALL", "TRACKS"),
     ("**image pair: corners, half, 128 tracks**", "IMAGE_PAIR", "ONE"),
 ]
 PER_DIRECTION = [

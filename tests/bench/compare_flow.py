@@ -29,7 +29,8 @@ ROUNDS = 7
 REPEAT = 21
 IMAGES = [("240×180", "sim/sim1_21/images"), ("752×480", "euroc_v101/cam0/data")]
 FLOWS = [  # title, window, stride, levels, iterations, backward Q8
-    ("**evstab, default: 31 px, every 2nd, 2 levels, 3 steps and the way back**", 31, 2, 2, 3, 128),
+    ("**evstab, default: 25 px, every 2nd, 2 levels, 5 steps, and the way back**", 25, 2, 2, 5, 128),
+    ("evstab, 31 px, every 2nd, 2 levels, 3 steps, and the way back", 31, 2, 2, 3, 128),
     ("evstab, 21 px, 3 levels, as many steps as OpenCV", 21, 1, 3, 30, 0),
     ("evstab, 31 px, 2 levels, as many steps as OpenCV", 31, 1, 2, 30, 0),
 ]

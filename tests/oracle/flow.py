@@ -37,7 +37,7 @@ UNTIL_CONVERGED = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 0.01)  #
 FLOWS = [
     ("21, 3 levels", (21, 1, 3, 30, 128), (21, 3), None, 0.05),
     ("31, 2 levels", (31, 1, 2, 30, 128), (31, 2), None, 0.05),
-    ("default, predicted", (31, 2, 2, 3, 128), (31, 2), (1.0, -0.8), 0.15),  # other samples: a quarter of OpenCV's
+    ("default, predicted", (25, 2, 2, 5, 128), (25, 2), (1.0, -0.8), 0.15),  # other samples: a quarter of OpenCV's
 ]
 SAME_SHARE_MIN = 0.9  # of those, nearer than 0.5 px, in near images: in far ones many tracks of both are wrong
 CELL_SHARE_MIN = 0.95  # cells with the same best corner

@@ -76,9 +76,9 @@ typedef struct {
 } evs_position_t;
 
 typedef struct {           /** Settings; copied by evs_flow_init(). */
-    uint16_t window_px;    /**< Side of the window: odd, [7, 31], default 31. */
+    uint16_t window_px;    /**< Side of the window: odd, [7, 31], default 25. */
     uint16_t stride_px;    /**< Every how many px it is sampled: 1 or 2, default 2. */
-    uint16_t n_iterations; /**< Most steps per level. [1, 100], default 3. */
+    uint16_t n_iterations; /**< Most steps per level. [1, 100], default 5. */
     uint16_t epsilon_q8; /**< Steps of at most that many 1/256 px along both axes are the last. [0, 256], default 3. */
     uint16_t min_eigen_q8;    /**< Least texture: smaller eigenvalue of the mean product of the gradients of the
                                    template, (grey levels/px)^2 Q8. [1, 65535], default 26 (0.1). */
