@@ -3,6 +3,7 @@
 #include "evs/corners.h"
 
 #include "evs/fixed.h"
+#include "evs_simd.h"
 
 #include <string.h>
 
@@ -12,9 +13,21 @@ enum { BLOCK = 5, MARGIN = EVS_CORNERS_MARGIN_PX };
 #define SOBEL_MAX 1020
 EVS_STATIC_ASSERT(BLOCK *BLOCK *SOBEL_MAX *SOBEL_MAX < (1 << 25), "sums of products are int32_t");
 
+/*
+ * Hosts go through a row in several loops over separate arrays, which their compilers turn into vectors. Microcontrollers go
+ * through it once: less to load and store.
+ */
+#define BY_ARRAYS (UINTPTR_MAX > UINT32_MAX)
+
+/* Sums of products of gradients. */
+typedef struct {
+    int32_t xx, xy, yy;
+} sums_t;
+
 /* The caller's memory. Rows are as long as the image is wide. */
 typedef struct {
     evs_corner_t *cells;
+#if BY_ARRAYS
     int32_t *sum_xx; /* of the products of the last BLOCK rows, per column */
     int32_t *sum_xy;
     int32_t *sum_yy;
@@ -22,6 +35,10 @@ typedef struct {
     int16_t *gy;
     int16_t *smooth; /* 1 2 1 down a column */
     int16_t *step;   /* -1 0 1 down a column */
+#else
+    sums_t *sums;        /* of the products of the last BLOCK rows, per column */
+    uint32_t *gradients; /* a ring of BLOCK rows: gx in the low, gy in the high half */
+#endif
 } parts_t;
 
 evs_corners_config_t evs_corners_config_default(uint16_t width_px, uint16_t height_px)
@@ -56,15 +73,23 @@ static parts_t divide_memory(const evs_corners_t *corners)
     const size_t w = corners->cfg.width_px;
     parts_t p;
     p.cells = corners->memory;
-    p.sum_xx = (int32_t *)(void *)(p.cells + (size_t)corners->n_columns * corners->n_rows);
+    void *const rows = p.cells + (size_t)corners->n_columns * corners->n_rows;
+#if BY_ARRAYS
+    p.sum_xx = rows;
     p.sum_xy = p.sum_xx + w;
     p.sum_yy = p.sum_xy + w;
     p.gx = (int16_t *)(void *)(p.sum_yy + w);
     p.gy = p.gx + BLOCK * w;
     p.smooth = p.gy + BLOCK * w;
     p.step = p.smooth + w;
+#else
+    p.sums = rows;
+    p.gradients = (uint32_t *)(void *)(p.sums + w);
+#endif
     return p;
 }
+
+#if BY_ARRAYS
 
 /* Gradients of row y, and the sums of products moved down to end with it. */
 static void add_row(const parts_t *p, const evs_image_t *image, size_t y)
@@ -91,6 +116,95 @@ static void add_row(const parts_t *p, const evs_image_t *image, size_t y)
         gy[x] = (int16_t)new_y;
     }
 }
+
+static inline void add_column(sums_t *sums, const parts_t *p, size_t x)
+{
+    sums->xx += p->sum_xx[x];
+    sums->xy += p->sum_xy[x];
+    sums->yy += p->sum_yy[x];
+}
+static inline void subtract_column(sums_t *sums, const parts_t *p, size_t x)
+{
+    sums->xx -= p->sum_xx[x];
+    sums->xy -= p->sum_xy[x];
+    sums->yy -= p->sum_yy[x];
+}
+
+#else
+
+/* Exchange one gradient of a column for another. */
+#if EVS_SIMD_DSP
+static inline int32_t add_difference(int32_t acc, uint32_t a, uint32_t b)
+{
+    __asm__("smlsd %0, %1, %2, %3" : "=r"(acc) : "r"(a), "r"(b), "r"(acc));
+    return acc;
+}
+static inline uint32_t exchange(sums_t *sums, uint32_t old, int32_t gx, int32_t gy)
+{
+    uint32_t both_x, both_y, new; /* the new one in the low half, the old one in the high half */
+    __asm__("pkhbt %0, %1, %2, lsl #16" : "=r"(both_x) : "r"(gx), "r"(old));
+    __asm__("pkhbt %0, %1, %2" : "=r"(both_y) : "r"(gy), "r"(old));
+    __asm__("pkhbt %0, %1, %2, lsl #16" : "=r"(new) : "r"(gx), "r"(gy));
+    sums->xx = add_difference(sums->xx, both_x, both_x);
+    sums->xy = add_difference(sums->xy, both_x, both_y);
+    sums->yy = add_difference(sums->yy, both_y, both_y);
+    return new;
+}
+#else
+static inline uint32_t exchange(sums_t *sums, uint32_t old, int32_t gx, int32_t gy)
+{
+    const int32_t old_x = (int16_t)(old & 0xFFFFu);
+    const int32_t old_y = (int32_t)old >> 16;
+    sums->xx += gx * gx - old_x * old_x;
+    sums->xy += gx * gy - old_x * old_y;
+    sums->yy += gy * gy - old_y * old_y;
+    return ((uint32_t)gx & 0xFFFFu) | ((uint32_t)gy << 16);
+}
+#endif
+
+/* Gradients of row y, and the sums of products moved down to end with it. */
+static void add_row(const parts_t *p, const evs_image_t *image, size_t y)
+{
+    const size_t w = image->width_px;
+    const uint8_t *px = image->px + y * w;
+    const uint8_t *const end = px + w;
+    uint32_t *gradient = p->gradients + (y % BLOCK) * w + 1u;
+    sums_t *sums = p->sums + 1u;
+    int32_t smooth[2], step[2]; /* 1 2 1 and -1 0 1 down the last two columns */
+    for (size_t k = 0u; k < 2u; k++) {
+        const int32_t above = *(px - w), below = px[w];
+        smooth[k] = above + 2 * *px + below;
+        step[k] = below - above;
+        px++;
+    }
+    while (px != end) {
+        const int32_t above = *(px - w), below = px[w];
+        const int32_t next_smooth = above + 2 * *px + below;
+        const int32_t next_step = below - above;
+        px++;
+        *gradient = exchange(sums++, *gradient, next_smooth - smooth[0], step[0] + 2 * step[1] + next_step);
+        gradient++;
+        smooth[0] = smooth[1];
+        smooth[1] = next_smooth;
+        step[0] = step[1];
+        step[1] = next_step;
+    }
+}
+
+static inline void add_column(sums_t *sums, const parts_t *p, size_t x)
+{
+    sums->xx += p->sums[x].xx;
+    sums->xy += p->sums[x].xy;
+    sums->yy += p->sums[x].yy;
+}
+static inline void subtract_column(sums_t *sums, const parts_t *p, size_t x)
+{
+    sums->xx -= p->sums[x].xx;
+    sums->xy -= p->sums[x].xy;
+    sums->yy -= p->sums[x].yy;
+}
+
+#endif
 
 /* Is the smaller eigenvalue of [xx xy; xy yy] at least s? It is when [xx-s xy; xy yy-s] has no negative one. */
 static inline bool reaches(int32_t xx, int32_t xy, int32_t yy, int32_t s)
@@ -120,19 +234,13 @@ static uint32_t too_low(uint32_t highest, uint32_t min_permille)
 static void score_row_of_cell(const parts_t *p, size_t x, size_t end, size_t y, evs_corner_t *cell, uint32_t *floor,
                               uint32_t *highest, uint32_t min_permille)
 {
-    int32_t xx = 0, xy = 0, yy = 0;
-    for (size_t k = x - 2u; k < x + 2u; k++) {
-        xx += p->sum_xx[k];
-        xy += p->sum_xy[k];
-        yy += p->sum_yy[k];
-    }
+    sums_t sums = {0, 0, 0};
+    for (size_t k = x - 2u; k < x + 2u; k++) { add_column(&sums, p, k); }
     int32_t beat = (int32_t)((cell->score > *floor) ? cell->score : *floor) + 1;
     for (; x < end; x++) {
-        xx += p->sum_xx[x + 2u];
-        xy += p->sum_xy[x + 2u];
-        yy += p->sum_yy[x + 2u];
-        if (reaches(xx, xy, yy, beat)) {
-            const uint32_t score = (uint32_t)smaller_eigenvalue(xx, xy, yy);
+        add_column(&sums, p, x + 2u);
+        if (reaches(sums.xx, sums.xy, sums.yy, beat)) {
+            const uint32_t score = (uint32_t)smaller_eigenvalue(sums.xx, sums.xy, sums.yy);
             cell->x_px = (uint16_t)x;
             cell->y_px = (uint16_t)y;
             cell->score = score;
@@ -142,9 +250,7 @@ static void score_row_of_cell(const parts_t *p, size_t x, size_t end, size_t y, 
             }
             beat = (int32_t)score + 1;
         }
-        xx -= p->sum_xx[x - 2u];
-        xy -= p->sum_xy[x - 2u];
-        yy -= p->sum_yy[x - 2u];
+        subtract_column(&sums, p, x - 2u);
     }
 }
 
