@@ -194,7 +194,6 @@ static void turn_grid(evs_velocity_t *v, evs_quat_t q_wr)
             evs_point_t at[2];
             evs_homography_map(&to_old, &centre, 1u, at);
             at[1] = follow(at[0], evs_flow_grid_at(&old, at[0]));
-            if (evs_point_is_outside(at[0])) { at[1] = at[0]; }
             evs_homography_map(&to_new, at, 2u, at);
             evs_flow_velocity_t flow = {0, 0};
             if (!evs_point_is_outside(at[0]) && !evs_point_is_outside(at[1])) {

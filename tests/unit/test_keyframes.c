@@ -123,6 +123,13 @@ static void test_no_partner_that_is_too_young_or_too_old(void)
     TEST_ASSERT_EQUAL_UINT32(0u, age_of_partner_us(100u * MS));
 }
 
+static void test_of_two_equally_near_the_older_one_is_the_partner(void)
+{
+    TEST_ASSERT_TRUE(evs_keyframes_store(&k, 0u, evs_quat_identity()));
+    TEST_ASSERT_TRUE(evs_keyframes_store(&k, 60u * MS, evs_quat_identity()));
+    TEST_ASSERT_EQUAL_UINT32(100u * MS, age_of_partner_us(100u * MS)); /* 70 ms are wanted: 100 or 40 */
+}
+
 static void test_time_that_runs_back_drops_what_lies_in_the_future(void)
 {
     TEST_ASSERT_TRUE(evs_keyframes_store(&k, 1000u * MS, evs_quat_identity()));
@@ -268,6 +275,7 @@ int main(void)
     RUN_TEST(test_first_speed_is_taken_as_it_is_and_later_ones_by_their_share);
     RUN_TEST(test_lost_patches_shorten_the_baseline_until_speed_is_seen_again);
     RUN_TEST(test_no_partner_that_is_too_young_or_too_old);
+    RUN_TEST(test_of_two_equally_near_the_older_one_is_the_partner);
     RUN_TEST(test_time_that_runs_back_drops_what_lies_in_the_future);
     RUN_TEST(test_images_keep_their_pixels_while_others_come_and_go);
     RUN_TEST(test_image_too_close_to_the_newest_stored_one_leaves_its_plane);

@@ -42,6 +42,7 @@ static bool late_work; /* one step of work a chunk, not all at once */
 static uint32_t t_start_us;
 static uint32_t t_now_us;
 static uint32_t seed;
+static int32_t offset_us; /* of the events' clock against that of the orientations */
 
 /* What came out. */
 static evs_velocity_result_t results[N_RESULTS];
@@ -51,6 +52,8 @@ static uint32_t n_images;
 static uint8_t newest_image[W * H];
 static uint32_t image_t_us;
 static uint32_t n_window_events;
+static uint32_t n_saccade_windows;
+static uint32_t n_saccade_windows_warped;
 
 static evs_pipeline_config_t config(void)
 {
@@ -74,6 +77,8 @@ static void init(const evs_pipeline_config_t *cfg)
     n_results = 0u;
     n_windows = 0u;
     n_images = 0u;
+    n_saccade_windows = 0u;
+    n_saccade_windows_warped = 0u;
     t_now_us = t_start_us;
     seed = 1u;
 }
@@ -98,6 +103,7 @@ void setUp(void)
     max_tracks = 1000u;
     never_work = false;
     late_work = false;
+    offset_us = 0;
     t_start_us = 9000u;
 }
 void tearDown(void) { TEST_ASSERT_TRUE_MESSAGE(memory[BYTES / 8u] == CANARY, "wrote past"); }
@@ -113,7 +119,7 @@ static void push_orientation(uint32_t t_us)
 {
     const double t_s = seconds(t_us), h = 1e-5;
     const model_quat_t d = model_mul(model_conj(camera_at(t_s - h)), camera_at(t_s + h));
-    const evs_orientation_t s = {.t_us = t_us,
+    const evs_orientation_t s = {.t_us = t_us - (uint32_t)offset_us,
                                  .q_wc = model_to_fixed(camera_at(t_s)),
                                  .rate_rad_s_q24 = evs_vec3_from_double(d.x / h, d.y / h, d.z / h, 24)};
     (void)evs_pipeline_push_orientation(&p, &s);
@@ -141,6 +147,10 @@ static void take_chunk(const evs_pipeline_chunk_t *c)
         return;
     }
     n_windows++;
+    if (c->saccade) {
+        n_saccade_windows++;
+        n_saccade_windows_warped += p.imaging->warping ? 1u : 0u;
+    }
     if (c->image.px == NULL) { return; }
     n_images++;
     TEST_ASSERT_EQUAL_UINT16(W, c->image.width_px);
@@ -271,6 +281,16 @@ static void test_shaken_camera_finds_its_direction_of_flight(void)
     TEST_ASSERT_EQUAL_UINT32(n_results, evs_velocity_counts(evs_pipeline_velocity_part(&p)).n_results);
 }
 
+static void test_offset_between_the_clocks_is_that_of_the_track(void)
+{
+    offset_us = 25000;
+    evs_pipeline_config_t cfg = config();
+    cfg.track.offset_us = offset_us;
+    init(&cfg);
+    fly_ms(250u, true);
+    assert_right(0u, 4.0);
+}
+
 static void test_backwards_is_told_from_forwards(void)
 {
     v_w[0] = -0.2;
@@ -298,7 +318,7 @@ static void test_rotation_alone_is_no_flight(void)
 static void test_saccades_cost_no_result(void)
 {
     spin_rad_s = 1.2;
-    const evs_pipeline_config_t cfg = config(); /* a sixth of the width is 27 px: a saccade after some 180 ms */
+    evs_pipeline_config_t cfg = config(); /* a sixth of the width is 27 px: a saccade after some 180 ms */
     init(&cfg);
     fly_ms(400u, true);
     size_t n_turned = 0u;
@@ -306,6 +326,11 @@ static void test_saccades_cost_no_result(void)
     TEST_ASSERT_TRUE(n_turned >= 2u);
     TEST_ASSERT_EQUAL_UINT(n_images - 1u, n_results); /* every image but the first found its keyframe */
     assert_right(0u, 4.0);
+    cfg.image = EVS_PIPELINE_IMAGE_SURFACE; /* which has no empty memory to lend for turning */
+    init(&cfg);
+    fly_ms(250u, true);
+    TEST_ASSERT_EQUAL_UINT(n_images - 1u, n_results);
+    TEST_ASSERT_TRUE(evs_velocity_counts(evs_pipeline_velocity_part(&p)).n_turned >= 1u);
 }
 
 static void test_rotation_once_per_window_gives_images_too(void)
@@ -361,39 +386,92 @@ static void test_result_does_not_depend_on_how_the_work_is_cut(void)
 
 /* --- images -------------------------------------------------------------------------------------------------------- */
 
+/* The images of a flight against those that the modules make of the chunks' points. */
+static uint32_t own_memory[EVS_IWE_BYTES(W, H, EVS_IWE_BILINEAR) / 4u];
+static uint8_t own_image[W * H];
+static evs_iwe_t own_iwe;
+static evs_surface_t own_surface;
+static uint32_t n_compared;
+
+static void compare(const evs_pipeline_config_t *cfg, const evs_pipeline_chunk_t *c)
+{
+    const bool surface = cfg->image == EVS_PIPELINE_IMAGE_SURFACE;
+    static bool fresh = true; /* the next event begins a window */
+    if (surface && c->saccade && fresh) { evs_surface_clear(&own_surface); }
+    fresh = false;
+    if (surface) {
+        evs_surface_add(&own_surface, c->events, c->stabilized, c->n);
+    } else {
+        evs_iwe_add(&own_iwe, c->stabilized, c->n);
+    }
+    if (c->end.reason == EVS_WINDOW_OPEN) { return; }
+    fresh = true;
+    if (surface) {
+        evs_surface_end_window(&own_surface, c->end.t_last_us - c->end.t_first_us);
+        evs_surface_render(&own_surface, c->end.t_last_us, own_image);
+    } else {
+        evs_iwe_render(&own_iwe, own_image);
+        evs_iwe_clear(&own_iwe);
+    }
+    TEST_ASSERT_EQUAL_MEMORY(own_image, c->image.px, sizeof own_image);
+    TEST_ASSERT_EQUAL_UINT32(c->end.t_first_us + (c->end.t_last_us - c->end.t_first_us) / 2u, c->image_t_us);
+    n_compared++;
+}
+
 static void test_image_is_that_of_the_stabilized_points_of_its_window(void)
 {
-    static uint32_t own_memory[EVS_IWE_BYTES(W, H, EVS_IWE_NEAREST) / 4u];
-    static uint8_t own[W * H];
-    evs_iwe_t iwe;
-    const evs_iwe_config_t iwe_cfg = evs_iwe_config_default(W, H);
-    TEST_ASSERT_EQUAL_INT(EVS_OK, evs_iwe_init(&iwe, &iwe_cfg, own_memory, sizeof own_memory));
-    evs_pipeline_config_t cfg = config();
-    cfg.velocity_on = false;
-    init(&cfg);
-    uint32_t n_compared = 0u;
-    for (unsigned step = 0u; step < 6u; step++, t_now_us += STEP_MS * MS) {
-        const size_t n = make_step();
-        push_orientations();
-        for (size_t i = 0u; i < n;) {
-            i += evs_pipeline_push_events(&p, &step_events[i], (n - i < N_LOT) ? n - i : N_LOT);
-            evs_pipeline_chunk_t c;
-            while (evs_pipeline_pull(&p, &c)) {
-                evs_iwe_add(&iwe, c.stabilized, c.n);
-                if (c.end.reason == EVS_WINDOW_OPEN) { continue; }
-                evs_iwe_render(&iwe, own);
-                evs_iwe_clear(&iwe);
-                TEST_ASSERT_EQUAL_MEMORY(own, c.image.px, sizeof own);
-                TEST_ASSERT_EQUAL_UINT32(c.end.t_first_us + (c.end.t_last_us - c.end.t_first_us) / 2u, c.image_t_us);
-                n_compared++;
+    static const evs_pipeline_image_t KINDS[] = {EVS_PIPELINE_IMAGE_COUNT, EVS_PIPELINE_IMAGE_IWE,
+                                                 EVS_PIPELINE_IMAGE_SURFACE};
+    spin_rad_s = 2.0; /* a saccade comes within 0.1 s */
+    for (size_t kind = 0u; kind < 3u; kind++) {
+        evs_pipeline_config_t cfg = config();
+        cfg.image = KINDS[kind];
+        cfg.velocity_on = false;
+        init(&cfg);
+        evs_iwe_config_t iwe_cfg = evs_iwe_config_default(W, H);
+        iwe_cfg.smooth = KINDS[kind] != EVS_PIPELINE_IMAGE_COUNT;
+        const evs_surface_config_t surface_cfg = evs_surface_config_default(W, H);
+        TEST_ASSERT_EQUAL_INT(EVS_OK, evs_surface_init(&own_surface, &surface_cfg, own_memory, sizeof own_memory));
+        TEST_ASSERT_EQUAL_INT(EVS_OK, evs_iwe_init(&own_iwe, &iwe_cfg, own_memory, sizeof own_memory));
+        n_compared = 0u;
+        uint32_t n_saccades = 0u;
+        if (KINDS[kind] == EVS_PIPELINE_IMAGE_SURFACE) { evs_surface_clear(&own_surface); }
+        for (unsigned step = 0u; step < 15u; step++, t_now_us += STEP_MS * MS) {
+            const size_t n = make_step();
+            push_orientations();
+            for (size_t i = 0u; i < n;) {
+                i += evs_pipeline_push_events(&p, &step_events[i], (n - i < N_LOT) ? n - i : N_LOT);
+                evs_pipeline_chunk_t c;
+                while (evs_pipeline_pull(&p, &c)) {
+                    compare(&cfg, &c);
+                    n_saccades += (c.saccade && (c.end.reason != EVS_WINDOW_OPEN)) ? 1u : 0u;
+                }
             }
         }
+        TEST_ASSERT_EQUAL_UINT32(7u, n_compared);
+        TEST_ASSERT_TRUE(n_saccades >= 1u);
     }
-    TEST_ASSERT_EQUAL_UINT32(2u, n_compared);
     evs_velocity_result_t none;
     TEST_ASSERT_FALSE(evs_pipeline_velocity(&p, 1u, &none));
     TEST_ASSERT_FALSE(evs_pipeline_velocity_busy(&p));
     TEST_ASSERT_NULL(evs_pipeline_velocity_part(&p));
+}
+
+static void test_restarted_clock_clears_a_time_surface(void)
+{
+    evs_pipeline_config_t cfg = config();
+    cfg.image = EVS_PIPELINE_IMAGE_SURFACE;
+    cfg.velocity_on = false;
+    cfg.source = EVS_PIPELINE_NONE;
+    init(&cfg);
+    fly_ms(50u, false);
+    t_start_us -= 1000000000u; /* 17 minutes back .. */
+    t_now_us = t_start_us;
+    flight_make_wall(3u, 1u); /* .. and nearly nothing to see */
+    fly_ms(50u, false);
+    uint32_t n_lit = 0u;
+    for (int i = 0; i < W * H; i++) { n_lit += (newest_image[i] > 0u) ? 1u : 0u; }
+    TEST_ASSERT_TRUE(n_lit < 100u);
 }
 
 /* Sum of squares over the square of the sum: the larger, the fewer pixels share the votes. */
@@ -468,6 +546,22 @@ static void test_time_of_an_image_is_that_to_which_its_events_were_moved(void)
     init(&cfg);
     fly_ms(50u, true);
     TEST_ASSERT_UINT32_WITHIN(200u, t_start_us, image_t_us); /* the first event, whose orientation all were given */
+    cfg = config_of_warp(EVS_PIPELINE_WARP_PREDICTED);
+    init(&cfg);
+    fly_ms(210u, true);
+    TEST_ASSERT_TRUE(p.imaging->warping);
+    TEST_ASSERT_UINT32_WITHIN(200u, t_start_us + 9u * WINDOW_US, image_t_us);
+}
+
+static void test_flow_of_another_reference_warps_nothing(void)
+{
+    spin_rad_s = 2.0;
+    evs_pipeline_config_t cfg = config_of_warp(EVS_PIPELINE_WARP_PREDICTED);
+    cfg.window.duration_us = WINDOW_US;
+    init(&cfg);
+    fly_ms(250u, true);
+    TEST_ASSERT_TRUE(n_saccade_windows >= 2u);
+    TEST_ASSERT_EQUAL_UINT32(0u, n_saccade_windows_warped);
 }
 
 static void test_turn_within_a_window_that_is_rotated_once_is_taken_out_by_a_warp(void)
@@ -524,6 +618,16 @@ static void test_windows_that_are_not_whole_give_no_image(void)
     evs_pipeline_finish(&p); /* nothing is open: nothing to count */
     pull();
     TEST_ASSERT_EQUAL_UINT32(3u, evs_pipeline_counts(&p).n_images_incomplete);
+
+    cfg = config();
+    init(&cfg);
+    fly_ms(50u, true);
+    TEST_ASSERT_EQUAL_UINT32(2u, n_images);
+    evs_pipeline_finish(&p); /* the third window is oriented, but cut off */
+    pull();
+    TEST_ASSERT_EQUAL_UINT32(3u, n_windows);
+    TEST_ASSERT_EQUAL_UINT32(2u, n_images);
+    TEST_ASSERT_EQUAL_UINT32(1u, evs_pipeline_counts(&p).n_images_incomplete);
 }
 
 static void test_clock_may_wrap(void)
@@ -620,6 +724,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_shaken_camera_finds_its_direction_of_flight);
+    RUN_TEST(test_offset_between_the_clocks_is_that_of_the_track);
     RUN_TEST(test_backwards_is_told_from_forwards);
     RUN_TEST(test_rotation_alone_is_no_flight);
     RUN_TEST(test_saccades_cost_no_result);
@@ -631,9 +736,11 @@ int main(void)
     RUN_TEST(test_warps_make_images_sharper);
     RUN_TEST(test_events_that_a_warp_cannot_keep_are_left_out_and_counted);
     RUN_TEST(test_time_of_an_image_is_that_to_which_its_events_were_moved);
+    RUN_TEST(test_flow_of_another_reference_warps_nothing);
     RUN_TEST(test_turn_within_a_window_that_is_rotated_once_is_taken_out_by_a_warp);
     RUN_TEST(test_image_of_a_busy_time_is_left_out_and_counted);
     RUN_TEST(test_windows_that_are_not_whole_give_no_image);
+    RUN_TEST(test_restarted_clock_clears_a_time_surface);
     RUN_TEST(test_clock_may_wrap);
     RUN_TEST(test_restarted_clock_forgets_the_images_and_goes_on);
     RUN_TEST(test_bytes_are_what_the_macros_say);

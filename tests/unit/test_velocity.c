@@ -25,6 +25,7 @@ static model_quat_t attitude;  /* that the camera swings about */
 static double swing_rad;       /* how far it swings */
 static evs_velocity_result_t results[N_RESULTS];
 static size_t n_results;
+static uint32_t t_newest_us[N_RESULTS]; /* of the image that each result is of */
 static uint32_t t_start_us;
 static uint32_t t_now_us; /* of the next image */
 static size_t max_tracks;
@@ -85,7 +86,7 @@ static void work(void)
 {
     for (unsigned i = 0u; evs_velocity_busy(&velocity); i++) {
         TEST_ASSERT_TRUE_MESSAGE(i < 1000u, "never ends");
-        if (evs_velocity_step(&velocity, max_tracks, &results[n_results])) { n_results++; }
+        if (evs_velocity_step(&velocity, max_tracks, &results[n_results])) { t_newest_us[n_results++] = t_now_us; }
     }
 }
 
@@ -173,6 +174,7 @@ static void test_camera_frame_is_that_of_the_middle_of_the_interval(void)
     assert_right(0u, 3.0);
     for (size_t i = 0u; i < n_results; i++) {
         TEST_ASSERT_BITS_LOW(EVS_VELOCITY_NO_ORIENTATION, results[i].flags);
+        TEST_ASSERT_EQUAL_UINT32(t_newest_us[i] - results[i].interval_us / 2u, results[i].t_us);
         /* The two directions differ by the camera's rotation at that very time, to the last digits. */
         const model_quat_t q_rc = model_mul(model_conj(reference), camera_at((results[i].t_us - t_start_us) * 1e-6));
         const evs_vec3_t back = evs_quat_rotate(model_to_fixed(q_rc), results[i].v_c_q30);
@@ -251,11 +253,43 @@ static void test_no_texture_and_five_dots_are_flagged(void)
 static void test_images_that_have_nothing_in_common_are_flagged(void)
 {
     for (unsigned i = 0u; i < 12u; i++, t_now_us += STEP_US) {
-        flight_make_wall(N_DOTS, 100u + i); /* other dots every time */
+        flight_make_wall(N_DOTS, 100u + 7919u * i); /* other dots every time */
         see();
         work();
+        if (i == 0u) { continue; }
+        TEST_ASSERT_BITS_HIGH(EVS_VELOCITY_UNLIKE, results[n_results - 1u].flags);
+        TEST_ASSERT_UINT16_WITHIN(30u, 256u, results[n_results - 1u].mismatch_q8);
+        TEST_ASSERT_EQUAL_INT16(0, evs_flow_grid_global(&velocity.grid).x_px_s_q3); /* no prediction from it */
+        TEST_ASSERT_TRUE(evs_keyframes_baseline_us(&velocity.keyframes) <= results[n_results - 1u].baseline_us);
     }
+    TEST_ASSERT_EQUAL_UINT32(10u * MS, evs_keyframes_baseline_us(&velocity.keyframes)); /* shorter and shorter */
     assert_none_valid();
+}
+
+static void test_scene_that_is_exchanged_ends_what_was_predicted(void)
+{
+    fly(12u);
+    TEST_ASSERT_TRUE(evs_flow_grid_global(&velocity.grid).x_px_s_q3 != 0);
+    flight_make_wall(N_DOTS, 77u);
+    see();
+    work();
+    TEST_ASSERT_BITS_HIGH(EVS_VELOCITY_UNLIKE, results[n_results - 1u].flags);
+    TEST_ASSERT_EQUAL_INT16(0, evs_flow_grid_global(&velocity.grid).x_px_s_q3);
+}
+
+static void test_too_few_is_below_the_least_number(void)
+{
+    fly(6u);
+    const evs_velocity_result_t first = results[0];
+    TEST_ASSERT_TRUE(first.mismatch_q8 < 128u);
+    for (unsigned missing = 0u; missing < 2u; missing++) {
+        evs_velocity_config_t cfg = evs_velocity_config_default(&pinhole);
+        cfg.min_features = (uint16_t)(first.n_flow + missing);
+        init(&cfg);
+        fly(6u);
+        TEST_ASSERT_EQUAL_UINT16(first.n_flow, results[0].n_flow); /* nothing has been learnt yet */
+        TEST_ASSERT_BITS(EVS_VELOCITY_FEW, (missing == 0u) ? 0u : EVS_VELOCITY_FEW, results[0].flags);
+    }
 }
 
 static void test_object_that_moves_by_itself_over_a_third_of_the_image_does_not_mislead(void)
@@ -274,6 +308,9 @@ static void test_object_that_moves_by_itself_over_a_third_of_the_image_does_not_
             TEST_ASSERT_DOUBLE_WITHIN(fmax(8.0, 3.0 * sigma_deg), 0.0, error_deg(results[i].v_r_q30, reference));
         }
     }
+    /* The next tracks there start where the still world would be: a track that errs must not lead the next one. */
+    const evs_point_t right = {16 * (W - 12), 16 * H / 2};
+    TEST_ASSERT_INT16_WITHIN(160, 0, evs_flow_grid_at(&velocity.grid, right).y_px_s_q3); /* the object: 340 */
 }
 
 /* --- saccades ------------------------------------------------------------------------------------------------------ */
@@ -335,6 +372,7 @@ static void test_without_a_scratch_plane_a_saccade_forgets_the_keyframes(void)
     TEST_ASSERT_EQUAL_INT(EVS_OK, evs_velocity_begin(&velocity, &image, NULL));
     TEST_ASSERT_FALSE(evs_velocity_busy(&velocity));
     TEST_ASSERT_EQUAL_UINT32(n_unpaired + 1u, evs_velocity_counts(&velocity).n_unpaired);
+    TEST_ASSERT_EQUAL_UINT(1u, velocity.keyframes.n_used); /* this one */
 }
 
 /* --- how it is called ---------------------------------------------------------------------------------------------- */
@@ -434,6 +472,11 @@ static void test_reset_forgets_everything_but_the_counters(void)
     see();
     evs_velocity_reset(&velocity);
     TEST_ASSERT_FALSE(evs_velocity_busy(&velocity));
+    TEST_ASSERT_EQUAL_INT16(0, evs_flow_grid_global(&velocity.grid).x_px_s_q3);
+    uint32_t t_us;
+    TEST_ASSERT_EQUAL_INT(EVS_ERR_STATE, evs_orientation_track_newest(&velocity.orientations, &t_us));
+    push_orientation(velocity.orientation_t_us + 1u); /* however close to the one before */
+    TEST_ASSERT_EQUAL_INT(EVS_OK, evs_orientation_track_newest(&velocity.orientations, &t_us));
     const uint32_t n_unpaired = evs_velocity_counts(&velocity).n_unpaired;
     see();
     TEST_ASSERT_FALSE(evs_velocity_busy(&velocity));
@@ -507,6 +550,8 @@ int main(void)
     RUN_TEST(test_no_motion_and_rotation_alone_are_flagged);
     RUN_TEST(test_no_texture_and_five_dots_are_flagged);
     RUN_TEST(test_images_that_have_nothing_in_common_are_flagged);
+    RUN_TEST(test_scene_that_is_exchanged_ends_what_was_predicted);
+    RUN_TEST(test_too_few_is_below_the_least_number);
     RUN_TEST(test_object_that_moves_by_itself_over_a_third_of_the_image_does_not_mislead);
     RUN_TEST(test_saccade_costs_no_result);
     RUN_TEST(test_predicted_flow_follows_the_reference);
