@@ -90,32 +90,38 @@ static view_t view_of(const evs_image_t *image)
 }
 
 /* memset() and memcpy() for a few bytes: those of a microcontroller's C library go one by one. */
-static void fill_bytes(uint8_t *out, uint8_t grey, int32_t n_bytes)
+static inline void copy_word(uint8_t *out, const void *in) { memcpy(out, in, 4u); }
+static inline void copy_tail(uint8_t *out, const void *in, int32_t n_bytes)
+{
+    const uint8_t *const bytes = in;
+    if ((n_bytes & 2) != 0) { memcpy(out, bytes, 2u); }
+    if ((n_bytes & 1) != 0) { out[n_bytes & 2] = bytes[n_bytes & 2]; }
+}
+static inline void fill_bytes(uint8_t *out, uint8_t grey, int32_t n_bytes)
 {
     const uint32_t word = grey * 0x01010101u;
     for (; n_bytes >= 4; n_bytes -= 4) {
-        memcpy(out, &word, 4u);
+        copy_word(out, &word);
         out += 4;
     }
-    if ((n_bytes & 2) != 0) {
-        memcpy(out, &word, 2u);
-        out += 2;
-    }
-    if ((n_bytes & 1) != 0) { *out = grey; }
+    copy_tail(out, &word, n_bytes);
 }
-static void copy_bytes(uint8_t *out, const uint8_t *in, int32_t n_bytes)
+static inline void copy_bytes(uint8_t *out, const uint8_t *in, int32_t n_bytes)
 {
+    for (; n_bytes >= 16; n_bytes -= 16) {
+        copy_word(out, in);
+        copy_word(out + 4, in + 4);
+        copy_word(out + 8, in + 8);
+        copy_word(out + 12, in + 12);
+        out += 16;
+        in += 16;
+    }
     for (; n_bytes >= 4; n_bytes -= 4) {
-        memcpy(out, in, 4u);
+        copy_word(out, in);
         out += 4;
         in += 4;
     }
-    if ((n_bytes & 2) != 0) {
-        memcpy(out, in, 2u);
-        out += 2;
-        in += 2;
-    }
-    if ((n_bytes & 1) != 0) { *out = *in; }
+    copy_tail(out, in, n_bytes);
 }
 
 /* Copy a part of the image that reaches over its border, which goes on outside. */
@@ -126,14 +132,15 @@ static void fill_patch(const evs_flow_t *flow, view_t *view, int32_t x, int32_t 
     const int32_t columns = flow->patch_columns;
     const int32_t n_left = evs_clamp(-x, 0, columns);
     const int32_t n_right = evs_clamp(x + columns - w, 0, columns);
-    const int32_t n_inside =
-        columns - n_left - n_right; /* at least 0: not all of it can be left and right of an image */
+    const int32_t n_inside = columns - n_left - n_right; /* at least 0: nothing is both left and right of an image */
+    const int32_t begin = evs_clamp(x, 0, w - 1);
+    const int32_t last = w - 1 - begin;
     uint8_t *out = flow->patch;
-    for (int32_t row = 0; row < flow->patch_rows; row++) {
-        const uint8_t *const in = view->image->px + (size_t)(evs_clamp(y + row, 0, h - 1) * w);
-        fill_bytes(out, in[0], n_left);
-        if (n_inside > 0) { copy_bytes(out + n_left, in + (x + n_left), n_inside); }
-        fill_bytes(out + n_left + n_inside, in[w - 1], n_right);
+    for (int32_t row = y; row < y + flow->patch_rows; row++) {
+        const uint8_t *const in = view->image->px + (evs_clamp(row, 0, h - 1) * w + begin);
+        if (n_left > 0) { fill_bytes(out, in[0], n_left); }
+        copy_bytes(out + n_left, in, n_inside);
+        if (n_right > 0) { fill_bytes(out + n_left + n_inside, in[last], n_right); }
         out += columns;
     }
     view->patch_x = x;
@@ -155,8 +162,13 @@ static evs_flow_place_t place(const evs_flow_t *flow, view_t *view, evs_position
 
     evs_flow_place_t at;
     evs_flow_set_weights(&at, ((uint32_t)x_q8 & 255u) / 2u, ((uint32_t)y_q8 & 255u) / 2u);
-    if ((x >= 0) && (y >= 0) && (x + n_columns <= view->image->width_px) && (y + n_rows <= view->image->height_px)) {
-        at.pitch = view->image->width_px;
+    /* What kernels read past the window only has to be memory: the next row will do, and the last row has none. */
+    const int32_t n_needed = flow->cfg.window_px + 3;
+    const int32_t w = view->image->width_px;
+    const int32_t h = view->image->height_px;
+    if ((x >= 0) && (y >= 0) && (x + n_needed <= w) && (y + n_rows <= h) &&
+        ((x + n_columns <= w) || (y + n_rows < h))) {
+        at.pitch = (size_t)w;
         at.px = view->image->px + (size_t)(y + 1) * at.pitch + (size_t)(x + 1);
         return at;
     }
