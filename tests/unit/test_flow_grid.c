@@ -149,6 +149,28 @@ static void test_lookup_is_exact_at_the_centres_and_replicates_the_edge(void)
     check_velocity(last.x_px_s_q3, last.y_px_s_q3, evs_flow_grid_at(&grid, largest));
 }
 
+static void test_centres_lie_in_the_middle_of_their_tiles(void)
+{
+    static const uint16_t SHAPES[][4] = {{240, 180, 8, 6}, {346, 260, 8, 6}, {2048, 2048, 64, 1}, {17, 5, 3, 5}};
+    for (size_t s = 0; s < sizeof SHAPES / sizeof SHAPES[0]; s++) {
+        TEST_ASSERT_EQUAL_INT(EVS_OK,
+                              evs_flow_grid_init(&grid, SHAPES[s][0], SHAPES[s][1], SHAPES[s][2], SHAPES[s][3]));
+        for (uint16_t r = 0u; r < SHAPES[s][3]; r++) {
+            for (uint16_t c = 0u; c < SHAPES[s][2]; c++) {
+                const evs_point_t p = evs_flow_grid_centre(&grid, c, r);
+                const double x_px = (c + 0.5) * SHAPES[s][0] / SHAPES[s][2] - 0.5;
+                const double y_px = (r + 0.5) * SHAPES[s][1] / SHAPES[s][3] - 0.5;
+                TEST_ASSERT_TRUE((fabs(p.x_q4 - 16.0 * x_px) < 1.0) && (fabs(p.y_q4 - 16.0 * y_px) < 1.0));
+                TEST_ASSERT_EQUAL_UINT32((uint32_t)r * SHAPES[s][2] + c, evs_flow_grid_tile_of(&grid, p));
+            }
+        }
+        TEST_ASSERT_EQUAL_UINT32(EVS_FLOW_GRID_TILES_MAX, evs_flow_grid_tile_of(&grid, evs_point_outside()));
+        TEST_ASSERT_EQUAL_UINT32(EVS_FLOW_GRID_TILES_MAX, evs_flow_grid_tile_of(&grid, point(0.0, -0.5625)));
+        TEST_ASSERT_EQUAL_UINT32(EVS_FLOW_GRID_TILES_MAX, evs_flow_grid_tile_of(&grid, point(-0.5625, 0.0)));
+        TEST_ASSERT_EQUAL_UINT32(0u, evs_flow_grid_tile_of(&grid, point(-0.5, -0.5)));
+    }
+}
+
 static void test_set_all_set_tile_and_clear(void)
 {
     evs_flow_grid_set_all(&grid, velocity(800, -90));
@@ -480,6 +502,7 @@ int main(void)
     RUN_TEST(test_init_names_the_fault_and_leaves_the_grid_alone);
     RUN_TEST(test_lookup_agrees_with_the_model_on_grids_of_every_shape);
     RUN_TEST(test_lookup_is_exact_at_the_centres_and_replicates_the_edge);
+    RUN_TEST(test_centres_lie_in_the_middle_of_their_tiles);
     RUN_TEST(test_set_all_set_tile_and_clear);
     RUN_TEST(test_fill_takes_the_median_of_each_tile);
     RUN_TEST(test_samples_at_the_borders_of_tiles_and_of_the_image);
