@@ -78,7 +78,7 @@ evs_warp_config_t evs_warp_config_default(evs_warp_kind_t kind, uint16_t width_p
                                    .n_rows = EVS_FLOW_GRID_ROWS,
                                    .n_budget = global ? EVS_WARP_BUDGET_GLOBAL : EVS_WARP_BUDGET_TILED,
                                    .n_min = global ? 500u : 40u,
-                                   .max_px = 16u,
+                                   .max_px = 32u,
                                    .shift = 1u,
                                    .noise_percent = 100u};
     return cfg;

@@ -16,7 +16,7 @@ enum { W = BENCH_IMAGE_WIDTH, H = BENCH_IMAGE_HEIGHT, N = BENCH_WARP_EVENTS, DOT
 static evs_event_t events[N];
 static evs_point_t points[N];
 static evs_point_t dots[DOTS];
-static uint16_t memory[EVS_WARP_BYTES(W, H, EVS_WARP_BUDGET_TILED, 16u, 1u) / 2u];
+static uint16_t memory[EVS_WARP_BYTES(W, H, EVS_WARP_BUDGET_TILED, EVS_WARP_MAX_PX, 1u) / 2u];
 static evs_warp_t warp;
 static evs_flow_grid_t flow;
 

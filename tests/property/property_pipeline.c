@@ -12,7 +12,7 @@ enum { N_KEPT = 200, N_BUDGET = 100 };
 static uint64_t memory[(EVS_PIPELINE_BYTES(W, H, 4, true, 20, N_FIFO, N_RING, N_BATCH) +
                         EVS_PIPELINE_IMAGE_BYTES(W, H, EVS_PIPELINE_IMAGE_SURFACE, EVS_IWE_GAUSSIAN,
                                                  EVS_PIPELINE_WARP_PREDICTED, true, N_BATCH) +
-                        EVS_PIPELINE_WARP_BYTES(W, H, N_KEPT, N_BUDGET, 16u, 1u) +
+                        EVS_PIPELINE_WARP_BYTES(W, H, N_KEPT, N_BUDGET, EVS_WARP_MAX_PX, 1u) +
                         EVS_VELOCITY_BYTES(W, H, 4u, 4u, 0u, 4u, 31u, 1u, 64u)) /
                        8u];
 static uint64_t state;

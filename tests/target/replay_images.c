@@ -20,8 +20,8 @@ static uint8_t plane[W_MAX * H_MAX];
 static uint8_t half[EVS_IMAGE_HALF(W_MAX) * EVS_IMAGE_HALF(H_MAX)];
 
 static evs_warp_t global, tiled;
-static uint16_t global_memory[EVS_WARP_BYTES(W_MAX, H_MAX, EVS_WARP_BUDGET_GLOBAL, 16u, 1u) / 2u];
-static uint16_t tiled_memory[EVS_WARP_BYTES(W_MAX, H_MAX, EVS_WARP_BUDGET_TILED, 16u, 1u) / 2u];
+static uint16_t global_memory[EVS_WARP_BYTES(W_MAX, H_MAX, EVS_WARP_BUDGET_GLOBAL, EVS_WARP_MAX_PX, 1u) / 2u];
+static uint16_t tiled_memory[EVS_WARP_BYTES(W_MAX, H_MAX, EVS_WARP_BUDGET_TILED, EVS_WARP_MAX_PX, 1u) / 2u];
 static evs_event_t events[WARP_EVENTS]; /* the first of the open window */
 static evs_point_t points[WARP_EVENTS];
 static size_t n_events;

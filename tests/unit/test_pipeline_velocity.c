@@ -19,7 +19,7 @@ enum { N_KEPT = 12000, N_BUDGET = 2000 };
     (EVS_PIPELINE_BYTES(W, H, 0u, false, 0u, N_FIFO, N_RING, N_BATCH) +                                                \
      EVS_PIPELINE_IMAGE_BYTES(W, H, EVS_PIPELINE_IMAGE_SURFACE, EVS_IWE_NEAREST, EVS_PIPELINE_WARP_PREDICTED, true,    \
                               N_BATCH) +                                                                               \
-     EVS_PIPELINE_WARP_BYTES(W, H, N_KEPT, N_BUDGET, 16u, 1u) + EVS_VELOCITY_DEFAULT_BYTES(W, H))
+     EVS_PIPELINE_WARP_BYTES(W, H, N_KEPT, N_BUDGET, EVS_WARP_MAX_PX, 1u) + EVS_VELOCITY_DEFAULT_BYTES(W, H))
 
 EVS_STATIC_ASSERT(EVS_PIPELINE_BYTES(240, 180, 8u, false, 34u * 26u, 2048u, 32u, 128u) +
                           EVS_PIPELINE_VELOCITY_BYTES(240, 180) + sizeof(evs_pipeline_t) <=
@@ -682,7 +682,7 @@ static void test_bytes_are_what_the_macros_say(void)
     TEST_ASSERT_EQUAL_UINT(base, evs_pipeline_bytes(&none));
     const evs_pipeline_config_t tiled = config_of_warp(EVS_PIPELINE_WARP_TILED);
     TEST_ASSERT_EQUAL_UINT(base + EVS_PIPELINE_VELOCITY_BYTES(W, H) +
-                               EVS_PIPELINE_WARP_BYTES(W, H, N_KEPT, N_BUDGET, 16u, 1u),
+                               EVS_PIPELINE_WARP_BYTES(W, H, N_KEPT, N_BUDGET, EVS_WARP_MAX_PX, 1u),
                            evs_pipeline_bytes(&tiled));
 }
 

@@ -67,7 +67,7 @@ typedef struct {          /** Settings; copied by evs_warp_init(). */
     uint32_t n_budget;      /**< Events that are looked at, [1, 65535]: of more, every k-th. */
     uint16_t n_min;         /**< Events that a tile (GLOBAL: the image) must have to be estimated. [2, 65535].
                                     Default 40 (GLOBAL: 500). */
-    uint16_t max_px;        /**< Displacement over the window that is searched, [2, 32]. Default 16. */
+    uint16_t max_px;        /**< Displacement over the window that is searched, [2, 32]. Default 32. */
     uint16_t shift;         /**< The image of all events has 1 / 2^shift of the resolution. [1, 4], default 1. */
     uint16_t noise_percent; /**< How far contrast must rise to be believed, in per cent of the most that it does for
                                  noise; 0: at all. [0, 1000], default 100. */
