@@ -4,8 +4,10 @@
 
 #include <string.h>
 
-#define SPACING_MAX_US UINT32_C(100000)
-#define PREDICT_US     INT32_C(65536) /* how long points follow the flow when the grid is turned */
+#define SPACING_MAX_US   UINT32_C(100000)
+#define RATE_MAX_Q24     (INT32_C(1) << 24)
+#define ROTATION_MAX_Q28 (INT32_C(1) << 28) /* of evs/egomotion.h */
+#define PREDICT_US       INT32_C(65536)     /* how long points follow the flow when the grid is turned */
 
 /* Windows are compared at every fourth pixel up to 12 px to either side of their middle. */
 enum { LOOK_PX = 12, LOOK_STEP_PX = 4 };
@@ -32,10 +34,10 @@ evs_velocity_config_t evs_velocity_config_default(const evs_pinhole_t *pinhole)
                                  .n_orientations = 64u,
                                  .orientation_spacing_us = 5000u,
                                  .track = evs_orientation_track_config_default()};
-    /* Measured over 20 flights. Windows overlap, so that neighbours err alike: five of them are worth one. */
+    /* Measured over 20 flights. Windows overlap, so that neighbours err alike: six of them are worth one. */
     cfg.flow.window_px = 25u;
     cfg.flow.n_iterations = 5u;
-    cfg.egomotion.variance_factor_q8 = 1280u;
+    cfg.egomotion.variance_factor_q8 = 1536u;
     return cfg;
 }
 
@@ -118,7 +120,8 @@ static uint32_t per_focal_q32(int32_t focal_q16) { return (uint32_t)((UINT64_C(1
 evs_status_t evs_velocity_init(evs_velocity_t *v, const evs_velocity_config_t *cfg, void *memory, size_t n_bytes)
 {
     if ((v == NULL) || (cfg == NULL) || (memory == NULL)) { return EVS_ERR_NULL; }
-    if (!sizes_ok(cfg) || (cfg->min_features < 1u) || (cfg->orientation_spacing_us > SPACING_MAX_US)) {
+    if (!sizes_ok(cfg) || (cfg->min_features < 1u) || (cfg->orientation_spacing_us > SPACING_MAX_US) ||
+        (cfg->residual_rate_rad_s_q24 < 0) || (cfg->residual_rate_rad_s_q24 > RATE_MAX_Q24)) {
         return EVS_ERR_ARG;
     }
     if ((n_bytes < evs_velocity_bytes(cfg)) || (((uintptr_t)memory & 7u) != 0u)) { return EVS_ERR_SIZE; }
@@ -447,6 +450,18 @@ static size_t collect_samples(const evs_velocity_t *v, evs_flow_sample_t *sample
     return n;
 }
 
+/* The solver's settings for this interval: what stabilization may have left of the rotation grows with it. */
+static evs_egomotion_config_t egomotion_config(const evs_velocity_t *v)
+{
+    evs_egomotion_config_t cfg = v->cfg.egomotion;
+    /* Q24 rad/s times us is Q24 urad; 2^28 / (2^24 * 10^6) = 16 / 10^6. */
+    const int64_t left_q28 = (int64_t)v->cfg.residual_rate_rad_s_q24 * v->pair.interval_us / 62500;
+    if (left_q28 > cfg.rotation_sigma_rad_q28) {
+        cfg.rotation_sigma_rad_q28 = (left_q28 < ROTATION_MAX_Q28) ? (int32_t)left_q28 : ROTATION_MAX_Q28;
+    }
+    return cfg;
+}
+
 static void solve(evs_velocity_t *v)
 {
     /* The pyramids are done with. */
@@ -460,8 +475,9 @@ static void solve(evs_velocity_t *v)
     pair->n_flow = (uint16_t)n;
     pair->flow_px_q8 = median(lengths_q8, n);
     pair->mismatch_q8 = mismatch_q8(v);
-    const evs_status_t status = evs_egomotion_solve(&v->cfg.egomotion, flow, n, scratch,
-                                                    EVS_EGOMOTION_PAPER_BYTES(v->n_tracks_max), &pair->solution);
+    const evs_egomotion_config_t cfg = egomotion_config(v);
+    const evs_status_t status =
+        evs_egomotion_solve(&cfg, flow, n, scratch, EVS_EGOMOTION_PAPER_BYTES(v->n_tracks_max), &pair->solution);
     EVS_ASSERT(status == EVS_OK);
     (void)status;
 

@@ -22,6 +22,7 @@ static evs_pinhole_t pinhole;
 static double v_w[3];          /* velocity in the world, m/s */
 static model_quat_t reference; /* q_wr */
 static model_quat_t attitude;  /* that the camera swings about */
+static double drift_rad_s;     /* how fast what is held still turns after all */
 static double swing_rad;       /* how far it swings */
 static evs_velocity_result_t results[N_RESULTS];
 static size_t n_results;
@@ -60,6 +61,7 @@ void setUp(void)
     reference = model_exp(0.05, -0.1, 0.1);
     attitude = reference;
     swing_rad = 0.0;
+    drift_rad_s = 0.0;
     t_start_us = 5000u;
     max_tracks = 1000u;
     init_default();
@@ -97,7 +99,8 @@ static void see(void)
     const double position[3] = {v_w[0] * t_s, v_w[1] * t_s, v_w[2] * t_s};
     uint8_t *const px = evs_velocity_plane(&velocity);
     TEST_ASSERT_NOT_NULL(px);
-    flight_render(&pinhole, reference, position, t_s, px);
+    const model_quat_t held = model_mul(reference, model_exp(0.0, drift_rad_s * t_s, 0.0));
+    flight_render(&pinhole, held, position, t_s, px);
     const evs_velocity_image_t image = {.px = px, .t_us = t_now_us, .q_wr = model_to_fixed(reference)};
     TEST_ASSERT_EQUAL_INT(EVS_OK, evs_velocity_begin(&velocity, &image, scratch));
 }
@@ -197,6 +200,29 @@ static void test_displacements_reach_the_target_at_any_speed(void)
         TEST_ASSERT_DOUBLE_WITHIN(0.7, 5.0, sum_px / 12.0);
         assert_right(n_results - 12u, 3.0);
     }
+}
+
+static double mean_error_deg(size_t from)
+{
+    double sum = 0.0;
+    for (size_t i = from; i < n_results; i++) { sum += error_deg(results[i].v_r_q30, reference); }
+    return sum / (double)(n_results - from);
+}
+
+static void test_rotation_that_is_left_is_allowed_for(void)
+{
+    drift_rad_s = 0.04;
+    fly(20u);
+    const double ignored_deg = mean_error_deg(4u);
+    evs_velocity_config_t cfg = evs_velocity_config_default(&pinhole);
+    cfg.residual_rate_rad_s_q24 = evs_q_from_double(0.04, 24);
+    init(&cfg);
+    fly(20u);
+    TEST_ASSERT_TRUE(ignored_deg > 2.0);
+    TEST_ASSERT_TRUE(mean_error_deg(4u) < 0.6 * ignored_deg);
+    const evs_velocity_result_t *const r = &results[n_results - 1u];
+    const double found_rad_s = fabs(evs_q_to_double(r->solution.rotation_rad_q28.y, 28)) / (r->interval_us * 1e-6);
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.04, found_rad_s);
 }
 
 static void test_sigma_is_honest(void)
@@ -509,7 +535,7 @@ static void test_init_refuses_what_any_module_refuses_and_leaves_the_context_alo
     TEST_ASSERT_EQUAL_INT(EVS_ERR_NULL, evs_velocity_init(&velocity, &good, NULL, N_BYTES));
     TEST_ASSERT_EQUAL_INT(EVS_ERR_SIZE, evs_velocity_init(&velocity, &good, memory, N_BYTES - 8u));
     TEST_ASSERT_EQUAL_INT(EVS_ERR_SIZE, evs_velocity_init(&velocity, &good, (uint8_t *)memory + 4, N_BYTES));
-    enum { N_BAD = 16 };
+    enum { N_BAD = 18 };
     evs_velocity_config_t bad[N_BAD];
     for (size_t i = 0u; i < N_BAD; i++) { bad[i] = good; }
     bad[0].keyframes.pinhole.fx_q16 = 0;
@@ -528,6 +554,8 @@ static void test_init_refuses_what_any_module_refuses_and_leaves_the_context_alo
     bad[13].n_orientations = 3u;
     bad[14].orientation_spacing_us = 100001u;
     bad[15].track.max_gap_us = 0u;
+    bad[16].residual_rate_rad_s_q24 = -1;
+    bad[17].residual_rate_rad_s_q24 = (1 << 24) + 1;
     for (size_t i = 0u; i < N_BAD; i++) {
         TEST_ASSERT_EQUAL_INT(EVS_ERR_ARG, evs_velocity_init(&velocity, &bad[i], memory, N_BYTES));
     }
@@ -546,6 +574,7 @@ int main(void)
     RUN_TEST(test_direction_and_its_sign_are_found_wherever_the_camera_flies);
     RUN_TEST(test_camera_frame_is_that_of_the_middle_of_the_interval);
     RUN_TEST(test_displacements_reach_the_target_at_any_speed);
+    RUN_TEST(test_rotation_that_is_left_is_allowed_for);
     RUN_TEST(test_sigma_is_honest);
     RUN_TEST(test_no_motion_and_rotation_alone_are_flagged);
     RUN_TEST(test_no_texture_and_five_dots_are_flagged);

@@ -55,6 +55,9 @@ typedef struct {                      /** Settings; copied by evs_velocity_init(
     evs_corners_config_t corners;     /**< Its size is set from the camera. */
     evs_flow_config_t flow;           /**< Default: windows of 25 px, 5 iterations. */
     evs_egomotion_config_t egomotion; /**< The method, and what may remain of the rotation. */
+    int32_t residual_rate_rad_s_q24;  /**< 1 sigma per axis of the rotation that stabilization may have left, as a rate:
+                                           egomotion.rotation_sigma_rad_q28 is this times the interval, if that is more.
+                                           [0, 2^24], default 0. */
     uint16_t n_levels;                /**< Of the pyramids. [1, EVS_FLOW_LEVELS_MAX], default 2. */
     uint16_t n_tracks;  /**< Most corners tracked, [8, 4096]; 0, the default: one per cell of the corners. */
     uint16_t grid_cols; /**< Tiles of the predicted flow. Default 8 x 6. */
