@@ -80,7 +80,9 @@ size_t evs_keyframes_choose(evs_keyframes_t *k, uint32_t t_us)
     uint32_t best_off_us = UINT32_MAX;
     for (size_t i = 0u; i < k->n_used; i++) {
         const uint32_t age_us = t_us - k->stored[i].t_us;
-        if ((age_us < k->cfg.baseline_min_us / 2u) || (age_us / AGES_MAX > k->baseline_us)) { continue; }
+        if ((age_us == 0u) || (age_us < k->cfg.baseline_min_us / 2u) || (age_us / AGES_MAX > k->baseline_us)) {
+            continue;
+        }
         const uint32_t off_us = (age_us > k->baseline_us) ? age_us - k->baseline_us : k->baseline_us - age_us;
         if (off_us < best_off_us) {
             best = i;

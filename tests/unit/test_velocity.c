@@ -477,6 +477,22 @@ static void test_without_orientations_the_reference_frame_stands(void)
     TEST_ASSERT_EQUAL_INT32(0, results[n_results - 1u].v_c_q30.x);
 }
 
+static void test_images_of_the_same_time_are_no_pair(void)
+{
+    evs_velocity_config_t cfg = evs_velocity_config_default(&pinhole);
+    cfg.keyframes.baseline_min_us = 1u;
+    init(&cfg);
+    for (unsigned i = 0u; i < 2u; i++) {
+        see();
+        TEST_ASSERT_FALSE(evs_velocity_busy(&velocity));
+    }
+    t_now_us++;
+    see();
+    work();
+    TEST_ASSERT_EQUAL_UINT(1u, n_results);
+    TEST_ASSERT_EQUAL_UINT32(1u, results[0].interval_us);
+}
+
 static void test_clock_may_wrap_and_restart(void)
 {
     t_start_us = UINT32_MAX - 150u * MS;
@@ -590,6 +606,7 @@ int main(void)
     RUN_TEST(test_image_is_refused_while_another_is_worked_on_and_does_no_harm);
     RUN_TEST(test_image_of_the_caller_is_as_good_as_the_plane);
     RUN_TEST(test_without_orientations_the_reference_frame_stands);
+    RUN_TEST(test_images_of_the_same_time_are_no_pair);
     RUN_TEST(test_clock_may_wrap_and_restart);
     RUN_TEST(test_reset_forgets_everything_but_the_counters);
     RUN_TEST(test_tracks_tell_which_agree);
