@@ -646,6 +646,43 @@ static void test_tiles_of_one_motion_agree(void)
     }
 }
 
+static void test_tiles_of_too_few_events_move_as_one(void)
+{
+    const evs_warp_config_t cfg = config(EVS_WARP_TILED, EVS_WARP_MEAN_SQUARE);
+    init(&cfg);
+    one_x = 3.0;
+    one_y = -2.0;
+    int n_one = 0;
+    for (int trial = 0; trial < 12; trial++) {
+        make_scene(800u, 60u, 60u, one_motion, 0u);
+        estimate(800u);
+        if (result.flags != EVS_WARP_ONE) { continue; }
+        n_one++;
+        for (uint16_t t = 0u; t < 12u; t++) {
+            TEST_ASSERT_EQUAL_MEMORY(&result.global, &flow.tiles[t], sizeof result.global);
+        }
+        TEST_ASSERT_TRUE(mean_error(one_motion) < 0.8);
+        TEST_ASSERT_TRUE(result.gain_q16 > 65536u);
+    }
+    TEST_ASSERT_TRUE(n_one >= 3);
+}
+
+static void test_noise_moves_tiles_by_little(void)
+{
+    evs_warp_config_t cfg = config(EVS_WARP_TILED, EVS_WARP_MEAN_SQUARE);
+    cfg.noise_percent = 0u;
+    init(&cfg);
+    double sum = 0.0;
+    for (int trial = 0; trial < 5; trial++) {
+        make_scene(6000u, 0u, 100u, one_motion, 0u);
+        estimate(6000u);
+        one_x = over_window(result.global.x_px_s_q3);
+        one_y = over_window(result.global.y_px_s_q3);
+        sum += mean_error(one_motion);
+    }
+    TEST_ASSERT_TRUE_MESSAGE(sum < 5.0 * 1.6, "nothing holds a tile: 1.1 px with what holds it, 2.5 px without");
+}
+
 static void test_tiles_with_few_events_follow_their_parents(void)
 {
     evs_warp_config_t cfg = config(EVS_WARP_TILED, EVS_WARP_MEAN_SQUARE);
@@ -935,6 +972,8 @@ int main(void)
     RUN_TEST(test_a_hot_pixel_does_not_wrap_the_contrast);
     RUN_TEST(test_tiles_recover_what_one_velocity_cannot);
     RUN_TEST(test_tiles_of_one_motion_agree);
+    RUN_TEST(test_tiles_of_too_few_events_move_as_one);
+    RUN_TEST(test_noise_moves_tiles_by_little);
     RUN_TEST(test_tiles_with_few_events_follow_their_parents);
     RUN_TEST(test_contrast_of_tiles_is_that_of_their_events);
     RUN_TEST(test_a_part_that_stands_still_is_left_alone);
