@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * SPDX-FileCopyrightText: 2026 the evstab authors */
-/* evstab egomotion: the direction of velocity alone, from flow vectors in a file. One output row per frame, also for those
- * that tell nothing, so that outputs line up with whatever else the user has per frame. */
+/* evstab egomotion: the direction of velocity alone, from flow vectors in a file. One output row per frame, also for
+ * those that tell nothing, so that outputs line up with whatever else the user has per frame. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>

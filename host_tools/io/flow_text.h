@@ -4,8 +4,8 @@
  * @file  flow_text.h
  * @brief Optical flow in text: a header that names the columns x, y, u, v and perhaps frame, then a vector a line.
  *
- * Columns are parted by commas, semicolons, blanks or tabs, in any order; further ones are ignored. Plain or gzip; one line
- * of memory. A line that is no vector is handed out with its fault, and counted.
+ * Columns are parted by commas, semicolons, blanks or tabs, in any order; further ones are ignored. Plain or gzip; one
+ * line of memory. A line that is no vector is handed out with its fault, and counted.
  */
 #ifndef EVH_FLOW_TEXT_H
 #define EVH_FLOW_TEXT_H

@@ -35,8 +35,8 @@ static bool config_ok(const evs_egomotion_config_t *cfg)
 
 /* --- judging ---------------------------------------------------------------------------------------------------- */
 
-/* Probability, Q16, that a vector of this length and of random direction ends within `limit` of a given line on the given
- * side: asin(limit / length) / pi, here by x (1 + x^2 / 2) / pi. */
+/* Probability, Q16, that a vector of this length and of random direction ends within `limit` of a given line on the
+ * given side: asin(limit / length) / pi, here by x (1 + x^2 / 2) / pi. */
 static uint32_t by_chance_q16(uint32_t length, uint32_t limit)
 {
     if (length <= limit) { return 32768u; }
@@ -71,8 +71,8 @@ typedef struct {
     uint16_t n_good[EVS_EGO_CELLS];
 } cells_t;
 
-/* Whether the outliers come in patches, as those of an object that moves by itself do, and not evenly: chi^2 per degree of
- * freedom, at least 1. */
+/* Whether the outliers come in patches, as those of an object that moves by itself do, and not evenly: chi^2 per degree
+ * of freedom, at least 1. */
 static evs_scaled_t patchiness(const cells_t *cells, uint32_t n_all, uint32_t n_good)
 {
     const int64_t n = n_all;
@@ -155,8 +155,8 @@ static void put_spread(const evs_egomotion_config_t *cfg, const judgement_t *jud
         result->flags |= EVS_EGOMOTION_DEGENERATE;
         return;
     }
-    /* few vectors fit themselves better than they fit the truth; and where outliers come in patches, more of the same are
-     * likely among the good ones: the root is between ignoring that and believing it of all */
+    /* few vectors fit themselves better than they fit the truth; and where outliers come in patches, more of the same
+     * are likely among the good ones: the root is between ignoring that and believing it of all */
     const int64_t n = (result->n_inliers > 5u) ? result->n_inliers : 5;
     const evs_scaled_t few = evs_scaled_div(evs_scaled(n * cfg->variance_factor_q8, -8), evs_scaled(n - 4, 0));
     const evs_scaled_t factor = evs_scaled_mul(few, evs_scaled_sqrt(judgement->patchiness));

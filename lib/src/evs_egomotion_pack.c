@@ -105,7 +105,7 @@ static void shorten(uint64_t longer, int64_t *u, int64_t *v)
 bool evs_ego_pack_one(const evs_egomotion_result_t *scale, const evs_egomotion_flow_t *flow, evs_ego_vector_t *packed)
 {
     if (!position_ok(flow) || is_still(flow)) { return false; }
-    /* Q24 with 1 = 2^24 to 1 = 2^(14 - position_shift_); the last value of the range must not round up out of 16 bits */
+    /* Q24 with 1 = 2^24 to 1 = 2^(14 - position_shift_); the last value of the range must not round out of 16 bits */
     const unsigned shift = 10u + scale->position_shift_;
     packed->x = evs_sat16(evs_shr_r(flow->x_q24, shift));
     packed->y = evs_sat16(evs_shr_r(flow->y_q24, shift));

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT
  * SPDX-FileCopyrightText: 2026 the evstab authors */
 /*
- * ERL and ERL-V as published, for comparison. The rotation is eliminated by least squares for each hypothesis (ERL) or zero
- * (ERL-V); weights are likelihoods over a coarse polar grid of hypotheses, the minimum of the weighted cost is sought on a
- * fine one and then followed downhill. Polar grids, the division of the residual by the length of the flow and the missing
- * sign are theirs.
+ * ERL and ERL-V as published, for comparison. The rotation is eliminated by least squares for each hypothesis (ERL) or
+ * zero (ERL-V); weights are likelihoods over a coarse polar grid of hypotheses, the minimum of the weighted cost is
+ * sought on a fine one and then followed downhill. Polar grids, the division of the residual by the length of the flow
+ * and the missing sign are theirs.
  */
 #include "evs_egomotion_private.h"
 
@@ -192,8 +192,8 @@ static evs_vec3_t search_grid(const paper_t *e, uint64_t *least)
     return best;
 }
 
-/* The nearest local minimum, by steps in eight directions that are halved when none leads down: needs no derivative, whose
- * approximation by least squares misleads when many vectors are outliers. */
+/* The nearest local minimum, by steps in eight directions that are halved when none leads down: needs no derivative,
+ * whose approximation by least squares misleads when many vectors are outliers. */
 static evs_vec3_t downhill(const paper_t *e, evs_vec3_t v, uint64_t least)
 {
     for (int32_t reach = 2 * FINEST << HALVINGS; reach > FINEST;) {

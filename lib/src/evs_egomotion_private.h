@@ -4,13 +4,13 @@
  * @file  evs_egomotion_private.h
  * @brief Private: what the parts of the ego-motion solver share.
  *
- * Formats. Positions (x, y, 1) are int16 with 1 = 2^(one_bits + 1); products with a unit vector in Q15, divided by 2^16, have
- * one_bits fractional bits. With one_bits = 13, 12, 11 positions reach 2, 4, 8, and each such product fits an int16.
- * Flow is int16 in steps of which the median length has 2^10; longer than 8 medians is shortened to that, so that an
- * outlier does not eat the bits of the others.
+ * Formats. Positions (x, y, 1) are int16 with 1 = 2^(one_bits + 1); products with a unit vector in Q15, divided by
+ * 2^16, have one_bits fractional bits. With one_bits = 13, 12, 11 positions reach 2, 4, 8, and each such product fits
+ * an int16. Flow is int16 in steps of which the median length has 2^10; longer than 8 medians is shortened to that, so
+ * that an outlier does not eat the bits of the others.
  *
- * Names, for a direction V: a = (x Vz - Vx, y Vz - Vy), the direction of the flow; c = u ay - v ax and d = u ax + v ay, its
- * components across and along, times |a|; r = c / |a| is the residual, d / |a|^2 the inverse depth rho.
+ * Names, for a direction V: a = (x Vz - Vx, y Vz - Vy), the direction of the flow; c = u ay - v ax and d = u ax + v ay,
+ * its components across and along, times |a|; r = c / |a| is the residual, d / |a|^2 the inverse depth rho.
  */
 #ifndef EVS_EGOMOTION_PRIVATE_H
 #define EVS_EGOMOTION_PRIVATE_H
@@ -319,7 +319,7 @@ uint32_t evs_ego_noise(const evs_ego_set_t *set, evs_vec3_t v_q30, uint32_t n_ma
 /* Sandwich covariance of v under the kernel of scale s: the sum is in the tangent plane 00, 01, 11, rad^2.
  * False: not positive definite. */
 bool evs_ego_covariance(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint32_t s, evs_scaled_t cov[3]);
-/* The first two rows and columns of H^-1 M H^-1, as above; lower triangles by rows. False: H is not positive definite. */
+/* The first two rows and columns of H^-1 M H^-1, as above; lower triangles by rows. False: H is singular. */
 bool evs_ego_sandwich(const evs_scaled_t *h, const evs_scaled_t *m, unsigned dim, evs_scaled_t cov[3]);
 
 /* Variance of the gradient, from its sums z[EVS_EGO_CELLS][dim] over the cells. */
@@ -349,8 +349,8 @@ bool evs_ego_is_rotation(const evs_ego_set_t *set, evs_vec3_t v_q30, uint32_t s)
 
 /* --- evs_egomotion_paper.c --- */
 
-/* The published estimators: v, and with `joint` the rotation, into the result; cov as of evs_ego_covariance(). The set is packed
- * without rotation. `likelihood` has room for set->n. False: no minimum with a covariance. */
+/* The published estimators: v, and with `joint` the rotation, into the result; cov as of evs_ego_covariance(). The set
+ * is packed without rotation. `likelihood` has room for set->n. False: no minimum with a covariance. */
 bool evs_ego_paper(const evs_ego_set_t *set, bool joint, uint32_t *likelihood, evs_egomotion_result_t *result,
                    evs_scaled_t cov[3]);
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
  * SPDX-FileCopyrightText: 2026 the evstab authors */
-/* Gauss-Newton on the residual across the flow direction, in the tangent plane of v, and what is known of its result. */
+/* Gauss-Newton on the residual across the flow direction, in the tangent plane of v, and the spread of its result. */
 #include "evs_egomotion_private.h"
 
 #include <string.h>
@@ -87,8 +87,8 @@ uint32_t evs_ego_noise(const evs_ego_set_t *set, evs_vec3_t v_q30, uint32_t n_ma
         set->key[m++] = evs_ego_key((uint64_t)((int64_t)w.c * r_per_a_q2) >> (set->one_bits - 2u)); /* 16 r^2 */
     }
     if (m == 0u) { return EVS_EGO_CLIP; }
-    /* The lower quartile instead of the median: |r| of a normal distribution lies below 0.3186 sigma for a quarter. With half
-     * of the vectors outliers it still falls among the good ones. 3.1383 = 1 / 0.3186, and 4 = sqrt(16). */
+    /* The lower quartile instead of the median: |r| of a normal distribution lies below 0.3186 sigma for a quarter.
+     * With half of the vectors outliers it still falls among the good ones. 3.1383 = 1 / 0.3186, and 4 = sqrt(16). */
     const uint64_t r2_q4 = evs_ego_key_value(evs_ego_select(set->key, m, m / 4u));
     return (uint32_t)(((uint64_t)evs_sqrt_u64(r2_q4 << 16) * 205672u) >> 26);
 }
@@ -167,8 +167,8 @@ bool evs_ego_covariance(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint
         spread += (uint64_t)((int64_t)z0 * z0) + (uint64_t)((int64_t)z1 * z1);
     }
     if (curvature <= 0) { return false; }
-    /* cov = H^-1 M H^-1 / kappa^2, kappa being the trace of the true Hessian over that of H: the true one by itself need
-     * not be positive, and its inverse would be noise. */
+    /* cov = H^-1 M H^-1 / kappa^2, kappa being the trace of the true Hessian over that of H: the true one by itself
+     * need not be positive, and its inverse would be noise. */
     const evs_scaled_t kappa = evs_scaled_div(evs_scaled(curvature, 0), evs_scaled(h00 + h11, 0));
     const evs_scaled_t h[3] = {evs_scaled_mul(evs_scaled(h00, 0), kappa), evs_scaled_mul(evs_scaled(h01, 0), kappa),
                                evs_scaled_mul(evs_scaled(h11, 0), kappa)};

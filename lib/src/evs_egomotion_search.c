@@ -39,9 +39,9 @@ static uint32_t pick(const evs_ego_set_t *set)
     return n;
 }
 
-/* How many vectors fit a direction and its opposite: the residual is below 0.35 of the median flow (the root of 1/8), the
- * inverse depth positive. A plain count spares a division per vector and hypothesis; the accuracy in the end is that of a
- * smooth kernel, and where an object moves by itself a narrow count is better. */
+/* How many vectors fit a direction and its opposite: the residual is below 0.35 of the median flow (the root of 1/8),
+ * the inverse depth positive. A plain count spares a division per vector and hypothesis; the accuracy in the end is
+ * that of a smooth kernel, and where an object moves by itself a narrow count is better. */
 static void score(const evs_ego_subset_t *s, uint32_t n, evs_ego_dir_t dir, uint32_t points[2])
 {
     uint32_t all = 0u;

@@ -4,8 +4,8 @@
  * @file  evs_scaled.h
  * @brief Private: numbers m * 2^e, for the few sums per problem whose range nobody can know beforehand.
  *
- * Normal equations span many octaves; a mantissa with an exponent keeps 30 bits wherever they lie. About 40 instructions
- * an operation: for solving small systems, not for loops over data.
+ * Normal equations span many octaves; a mantissa with an exponent keeps 30 bits wherever they lie. About 40
+ * instructions an operation: for solving small systems, not for loops over data.
  */
 #ifndef EVS_SCALED_H
 #define EVS_SCALED_H

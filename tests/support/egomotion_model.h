@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT
  * SPDX-FileCopyrightText: 2026 the evstab authors */
 /*
- * The estimators of evs/egomotion.h in double precision, written from their description: the robust one, the best that can
- * be done by one who knows which vectors are good, and the published ones.
+ * The estimators of evs/egomotion.h in double precision, written from their description: the robust one, the best that
+ * can be done by one who knows which vectors are good, and the published ones.
  */
 #ifndef EVS_TEST_EGOMOTION_MODEL_H
 #define EVS_TEST_EGOMOTION_MODEL_H

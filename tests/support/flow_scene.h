@@ -77,8 +77,8 @@ static inline void scene_flow(double x, double y, double z, const double way[3],
     flow[1] = dy - y * dz;
 }
 
-/* n vectors of a scene with truth->v and truth->w. bad[i], where it is not NULL, tells whether vector i is an outlier or
- * belongs to the object. */
+/* n vectors of a scene with truth->v and truth->w. bad[i], where it is not NULL, tells whether vector i is an outlier
+ * or belongs to the object. */
 static inline void scene_make_labelled(const scene_settings_t *s, const scene_truth_t *truth, evs_egomotion_flow_t *out,
                                        size_t n, unsigned char *bad)
 {

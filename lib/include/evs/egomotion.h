@@ -4,21 +4,21 @@
  * @file  evs/egomotion.h
  * @brief Direction of the camera's own velocity from optical flow whose rotation has been removed.
  *
- * Model    u = rho (x Vz - Vx), v = rho (y Vz - Vy), rho > 0: what a still scene at unknown depths shows to a camera that
- *          moves along V without turning. (x, y) is a position in K^-1 px, (u, v) its displacement over the interval.
- *          ROBUST: 64 directions spread evenly over a half sphere, each with both signs, are tried on at most 128 of the
- *          vectors; the best is refined on all of them by Gauss-Newton steps on the residual across the flow direction,
- *          with Geman-McClure weights and a scale that half of the vectors being outliers does not break. The sign is
- *          part of the estimate.
+ * Model    u = rho (x Vz - Vx), v = rho (y Vz - Vy), rho > 0: what a still scene at unknown depths shows to a camera
+ *          that moves along V without turning. (x, y) is a position in K^-1 px, (u, v) its displacement.
+ *          ROBUST: 64 directions spread evenly over a half sphere, each with both signs, are tried on at most 128 of
+ *          the vectors; the best is refined by Gauss-Newton steps on the residual across the flow direction, with
+ *          weights of Geman and McClure and a scale that stands when half of the vectors are outliers. The sign is
+ *          part of the estimate. With a prior on the residual rotation, V and a rotation are estimated together: for
+ *          an attitude that is not perfect.
  *          PAPER and ERL: the published estimators [1], [2], for comparison. They are slower and 2 to 7 times less
- *          accurate; [1] states no sign, here the majority of the vectors gives it.
- *          With a prior on the residual rotation (ROBUST), V and a rotation are estimated together: for an imperfect
- *          attitude.
- *          Never feed it normal flow, that is the component across an edge that a plane fit to the time surface gives:
+ *          accurate; they state no sign, here the majority of the vectors gives it.
+ *          Never feed it normal flow, that is the component across an edge, as a plane fit to the time surface gives:
  *          with unknown depth such a vector says nothing but a sign, and the answer would be wrong by tens of degrees.
- * Memory   EVS_EGOMOTION_BYTES(n) of the caller's for the call; less than 1 KB of stack.
- * Cost     docs/performance.md has the instruction counts. Steps are bounded: nothing iterates until convergence.
+ * Memory   EVS_EGOMOTION_BYTES(n) of the caller's, for the call.
+ * Cost     docs/performance.md. All loops are bounded: nothing iterates until it converges.
  * Numeric  integers only, bit-exact on every target. Flow is scaled so that its median length is 2^10 steps.
+ * Time     none: the displacements' interval is the caller's.
  * Threads  no state.
  *
  * [1] A. Jaegle, S. Phillips, K. Daniilidis, "Fast, Robust, Continuous Monocular Egomotion Computation", ICRA 2016.
@@ -67,9 +67,9 @@ typedef struct { /** Settings. */
     evs_egomotion_flow_kind_t flow_kind; /**< Default FULL_FLOW. */
     int32_t rotation_sigma_rad_q28;      /**< ROBUST: 1 sigma per axis of the rotation that may be left in the flow over
                                               the interval (rate times interval), [0, 2^28]. Default 0: none is left. */
-    uint16_t variance_factor_q8; /**< Over how many vectors an error of the flow extends (overlapping windows of the
-                                              tracker make neighbours err alike), in 1/256: the variance of V is multiplied
-                                              by it. [256, 65535], default 256: errors are independent. */
+    uint16_t variance_factor_q8;         /**< The variance of V is multiplied by it, in 1/256: over how many vectors an
+                                              error of the flow extends where windows of the tracker overlap.
+                                              [256, 65535], default 256: errors are independent. */
 } evs_egomotion_config_t;
 
 /** Flags of a result. Without VALID, v is the best guess and sigma says half a turn. */
@@ -79,16 +79,16 @@ enum {
     EVS_EGOMOTION_STILL = 1 << 2,       /**< No vector has a length. */
     EVS_EGOMOTION_CHANCE = 1 << 3,      /**< No more vectors agree than would by chance. */
     EVS_EGOMOTION_SIGN_UNSURE = 1 << 4, /**< V or -V: the vectors that agree point both ways. */
-    EVS_EGOMOTION_ROTATION = 1 << 5,    /**< A rotation explains the flow better than any translation. */
+    EVS_EGOMOTION_ROTATION = 1 << 5,    /**< A rotation explains the flow about as well as any translation. */
     EVS_EGOMOTION_DEGENERATE = 1 << 6   /**< The vectors leave a direction open: sigma would exceed a radian. */
 };
 
 #define EVS_EGOMOTION_INLIERS_MIN 8u /**< Vectors that must agree. */
 
 typedef struct {
-    evs_vec3_t v_q30;            /**< The camera's own velocity: unit vector, signed. */
-    evs_vec3_t rotation_rad_q28; /**< Rotation found in the flow: with a prior, or by ERL; else zero. */
-    int32_t sigma_rad_q28;       /**< Expected error of v as an angle (root mean square), at most pi; pi = no idea. */
+    evs_vec3_t v_q30;               /**< The camera's own velocity: unit vector, signed. */
+    evs_vec3_t rotation_rad_q28;    /**< Rotation found in the flow: with a prior, or by ERL; else zero. */
+    int32_t sigma_rad_q28;          /**< Expected error of v, an angle (RMS), at most 1 rad; pi if not VALID. */
     int32_t covariance_rad2_q30[6]; /**< Of v: xx, xy, xz, yy, yz, zz; zeros when not VALID. */
     uint32_t flags;                 /**< EVS_EGOMOTION_VALID, ... */
     uint32_t n_flow;                /**< Vectors with a length and a position in range: those used. */
@@ -107,20 +107,21 @@ evs_egomotion_config_t evs_egomotion_config_default(void);
 /**
  * Estimate the direction of the velocity.
  * Data that allow no answer are no error: the result then lacks VALID, and its flags tell why.
- * @param      flow       n vectors, in any order; better an order that is spread over the image, since the search looks at
- *                        every (n/128)-th.
- * @param      scratch    n_scratch bytes, aligned to 4; contents do not matter.
+ * @param      flow       n vectors, in any order; better an order that is spread over the image, since the search looks
+ *                        at every (n/128)-th.
+ * @param      scratch    n_scratch bytes, aligned to 4; contents do not matter. EVS_EGOMOTION_BYTES(n) or, for PAPER
+ *                        and ERL, EVS_EGOMOTION_PAPER_BYTES(n). May be NULL where n is 0, and so may flow.
  * @param[out] result     Untouched on error.
- * @return EVS_OK, EVS_ERR_NULL, EVS_ERR_ARG (a setting is out of range, or the flow is normal flow) or EVS_ERR_SIZE (n is
- *         above EVS_EGOMOTION_N_MAX, the scratch is too small or misaligned).
+ * @return EVS_OK, EVS_ERR_NULL, EVS_ERR_ARG (a setting is out of range, or the flow is normal flow) or EVS_ERR_SIZE (n
+ *         is above EVS_EGOMOTION_N_MAX, the scratch is too small or misaligned).
  */
 EVS_NODISCARD evs_status_t evs_egomotion_solve(const evs_egomotion_config_t *cfg, const evs_egomotion_flow_t *flow,
                                                size_t n, void *scratch, size_t n_scratch,
                                                evs_egomotion_result_t *result);
 
 /**
- * Whether a vector of the solved set agrees with the result: it points the way it should, and ends within 2.5 sigma of the
- * noise from its line. The number of vectors for which this holds is n_inliers.
+ * Whether a vector of the solved set agrees with the result: it points the way it should, and ends within 2.5 sigma of
+ * the noise from its line. The number of vectors for which this holds is n_inliers.
  */
 bool evs_egomotion_is_inlier(const evs_egomotion_result_t *result, const evs_egomotion_flow_t *flow);
 
