@@ -288,8 +288,34 @@ static void test_any_numbers(void)
     }
 }
 
-int main(void)
+/* Not a test: the table of docs/modules/egomotion.md. `test_property_egomotion published 400` takes some minutes. */
+static int print_published(int n_scenes)
 {
+    static const char *const NAMES[] = {"", "ERL-V", "ERL"};
+    for (int method = 1; method <= 2; method++) {
+        setUp();
+        cfg.method = (evs_egomotion_method_t)method;
+        for (int noise = 0; noise < 3; noise++) {
+            (void)printf("%s, %.1f px, 0 / 10 / 30 / 50 %%:", NAMES[method], NOISE_PX[noise]);
+            for (int outliers = 0; outliers < 4; outliers++) {
+                const scene_settings_t s = scene_settings(NOISE_PX[noise], OUTLIERS[outliers]);
+                double sum = 0.0;
+                for (int t = 0; t < n_scenes; t++) {
+                    const scene_truth_t truth = make(&s, 0.0, N);
+                    sum += solve(&truth, N);
+                }
+                (void)printf(" %.2f", sum / n_scenes);
+                (void)fflush(stdout);
+            }
+            (void)printf("\n");
+        }
+    }
+    return 0;
+}
+
+int main(int argc, char **argv)
+{
+    if ((argc == 3) && (strcmp(argv[1], "published") == 0)) { return print_published(atoi(argv[2])); }
     UNITY_BEGIN();
     RUN_TEST(test_goals_noise_02);
     RUN_TEST(test_goals_noise_05);
