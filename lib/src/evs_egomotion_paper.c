@@ -234,9 +234,9 @@ static void add_up(const paper_t *e, const evs_ego_frame_t *f, const evs_ego_tur
         const evs_ego_rows_t rows = evs_ego_rows(set, &set->vec[i]);
         int32_t left[2];
         evs_ego_left_over(set, &set->vec[i], &rows, turn, left);
-        const evs_ego_vector_t p = {set->vec[i].x, set->vec[i].y,
-                                    (int16_t)evs_clamp(left[0], -EVS_EGO_CLIP, EVS_EGO_CLIP),
-                                    (int16_t)evs_clamp(left[1], -EVS_EGO_CLIP, EVS_EGO_CLIP)};
+        const int32_t limit = EVS_EGO_CLIP * 181 / 256; /* the length stays below EVS_EGO_CLIP */
+        const evs_ego_vector_t p = {set->vec[i].x, set->vec[i].y, (int16_t)evs_clamp(left[0], -limit, limit),
+                                    (int16_t)evs_clamp(left[1], -limit, limit)};
         const evs_ego_view_t w = evs_ego_view(&p, loop.v);
         if (evs_ego_near_focus(set, &w)) { continue; }
         const uint32_t weight_q30 = weight_q15(e, i) * weight_q15(e, i);

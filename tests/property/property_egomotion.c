@@ -19,6 +19,7 @@ static uint64_t scratch[EVS_EGOMOTION_PAPER_BYTES(N) / 8u + 1u];
 static evs_egomotion_config_t cfg;
 static evs_egomotion_result_t result;
 static double errors[TRIALS];
+static double honesty; /* RMS error over RMS sigma */
 
 void setUp(void)
 {
@@ -93,7 +94,7 @@ static void check_cell(int noise, int outliers)
     qsort(errors, TRIALS, sizeof errors[0], by_size);
     const double mean = sum / TRIALS;
     const double p95 = errors[TRIALS * 95 / 100];
-    const double honesty = sqrt(sum_sq / sigma_sq);
+    honesty = sqrt(sum_sq / sigma_sq);
     (void)printf("%.1f px, %2.0f %%: mean %.2f (model %.2f, apart %.3f; oracle %.2f), p95 %.2f, RMS/sigma %.2f\n",
                  s.noise_px, 100.0 * s.outliers, mean, of_model / TRIALS, apart / TRIALS, of_oracle / TRIALS, p95,
                  honesty);
@@ -120,15 +121,20 @@ static void test_goals_noise_10(void)
 
 static double mean_error(const scene_settings_t *s, double rotation_rad, size_t n, int *n_valid)
 {
-    double sum = 0.0;
+    double sum = 0.0, sum_sq = 0.0, sigma_sq = 0.0;
     *n_valid = 0;
     for (int t = 0; t < TRIALS; t++) {
         const scene_truth_t truth = make(s, rotation_rad, n);
         const double error = solve(&truth, n);
         if ((result.flags & (uint32_t)EVS_EGOMOTION_VALID) == 0u) { continue; }
         sum += error;
+        sum_sq += error * error;
+        sigma_sq += scene_sigma_deg(&result) * scene_sigma_deg(&result);
         *n_valid += 1;
     }
+    honesty = sqrt(sum_sq / sigma_sq);
+    (void)printf("%zu vectors, rotation %.4f rad: mean %.2f, RMS/sigma %.2f\n", n, rotation_rad, sum / *n_valid,
+                 honesty);
     return sum / *n_valid;
 }
 
@@ -148,7 +154,12 @@ static void test_residual_rotation(void)
     TEST_ASSERT_TRUE(mean_error(&s, rotation, N, &n_valid) <= 1.8);
     cfg.rotation_sigma_rad_q28 = evs_q_from_double(rotation, 28);
     TEST_ASSERT_TRUE(mean_error(&s, rotation, N, &n_valid) <= 1.35);
+    TEST_ASSERT_TRUE((honesty >= 0.7) && (honesty <= 1.3));
     TEST_ASSERT_EQUAL_INT(TRIALS, n_valid);
+    const scene_settings_t clean = scene_settings(0.05, 0.0); /* here the rotation is most of the error */
+    cfg.rotation_sigma_rad_q28 = evs_q_from_double(4.0 * rotation, 28);
+    (void)mean_error(&clean, 4.0 * rotation * sqrt(3.0), 60, &n_valid);
+    TEST_ASSERT_TRUE((honesty >= 0.7) && (honesty <= 1.3));
 }
 
 /* Bad data at any rate: flags, or an error that sigma accounts for. Returns how many were confident and wrong. */

@@ -134,6 +134,38 @@ static void test_inliers_are_those_counted(void)
     TEST_ASSERT_EQUAL_UINT32(result.n_inliers, n);
 }
 
+static void test_inliers_lie_within_two_and_a_half_sigma(void)
+{
+    uint32_t n = 0u;
+    for (int i = 0; i < 8; i++) {
+        const scene_settings_t s = scene_settings(0.3, 0.0);
+        const scene_truth_t truth = random_truth();
+        scene_make(&s, &truth, flow, N_MAX);
+        solve(N_MAX);
+        n += result.n_inliers;
+    }
+    TEST_ASSERT_UINT32_WITHIN(6u * 8u, 490u * 8u, n); /* 98.8 % of a normal distribution; the noise is an estimate */
+}
+
+static void test_a_long_vector_keeps_its_direction(void)
+{
+    const scene_settings_t s = scene_settings(0.05, 0.0);
+    const scene_truth_t truth = random_truth();
+    scene_make(&s, &truth, flow, 200);
+    for (size_t i = 0; i < 20; i++) { /* very close to the camera, up to 200 times as long as the others */
+        double uv[2];
+        const double way[3] = {0.05 * truth.v[0], 0.05 * truth.v[1], 0.05 * truth.v[2]};
+        const double x = scene_uniform() - 0.5;
+        const double y = scene_uniform() - 0.5;
+        scene_flow(x, y, 0.01 + 0.01 * (double)i, way, truth.w, uv);
+        flow[i] = scene_vector(x, y, uv[0], uv[1]);
+    }
+    solve(200);
+    TEST_ASSERT_EQUAL_HEX32(EVS_EGOMOTION_VALID, result.flags);
+    for (size_t i = 0; i < 20; i++) { TEST_ASSERT_TRUE(evs_egomotion_is_inlier(&result, &flow[i])); }
+    TEST_ASSERT_TRUE(scene_error_deg(&result, truth.v) < 0.2);
+}
+
 static void test_no_vector_and_no_motion(void)
 {
     TEST_ASSERT_EQUAL_INT(EVS_OK, evs_egomotion_solve(&cfg, NULL, 0, NULL, 0, &result));
@@ -432,6 +464,8 @@ int main(void)
     RUN_TEST(test_exact_flow_gives_the_direction);
     RUN_TEST(test_noise_and_outliers);
     RUN_TEST(test_inliers_are_those_counted);
+    RUN_TEST(test_inliers_lie_within_two_and_a_half_sigma);
+    RUN_TEST(test_a_long_vector_keeps_its_direction);
     RUN_TEST(test_no_vector_and_no_motion);
     RUN_TEST(test_random_directions_are_chance);
     RUN_TEST(test_five_vectors_are_few);
