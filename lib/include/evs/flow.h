@@ -14,7 +14,8 @@
  * Cost     independent of the size of the image; docs/performance.md counts it. Bounded: n_levels * n_iterations steps,
  *          and n_iterations for the way back.
  * Numeric  integers only, bit-exact on every target. Positions are Q8 px, grey values Q7 and gradients Q1 where they are
- *          multiplied, sums exact. No image content overflows; evs_flow.c has the proofs.
+ *          multiplied, sums exact. No image content overflows; evs_flow_kernel.h and
+ *          evs_flow.c have the bounds.
  * Threads  no shared state; one context must not be entered from two threads or ISRs at once.
  *
  * [1] B. D. Lucas, T. Kanade, "An Iterative Image Registration Technique with an Application to Stereo Vision",
@@ -96,11 +97,11 @@ typedef enum {
 
 typedef struct {         /** A point to track. */
     evs_position_t from; /**< In: where it is in the first image. */
-    evs_position_t to;   /**< In: where to start looking in the second one, `from` if nothing is known. Out: where it
-                               is; of no use unless the status is EVS_FLOW_OK. */
-    uint16_t
-        residual_q8; /**< Out: mean absolute difference of the two windows, grey levels Q8; 0 unless EVS_FLOW_OK. */
-    uint8_t status;  /**< Out: an evs_flow_status_t. */
+    /** In: where to start looking in the second image; `from` if nothing is known. Out: where it is; of no use unless the
+     * status is EVS_FLOW_OK. */
+    evs_position_t to;
+    uint16_t residual_q8; /**< Out: mean |difference| of the windows, grey levels Q8; 0 unless EVS_FLOW_OK. */
+    uint8_t status;       /**< Out: an evs_flow_status_t. */
 } evs_flow_track_t;
 
 typedef struct { /** Context. A complete type only so that you can place it: every member is private. */
