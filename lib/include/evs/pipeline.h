@@ -21,8 +21,10 @@
  *          orientation with the time constant view_tau_ms.
  * Memory   one evs_pipeline_t and one block of caller memory: evs_pipeline_bytes(), or for a static array
  *          EVS_PIPELINE_BYTES(). For 240 x 180 with a grid of step 8, 34 x 26 tiles, 2048 events, 32 orientations and
- *          batches of 128: 23432 bytes, and the context of about 1 KB.
- * Cost     per event undistort + window + rotate, per slice a new orientation: docs/performance.md counts both.
+ *          batches of 128: 23432 bytes, and the context of about 1 KB. With images and the direction of flight
+ *          EVS_PIPELINE_VELOCITY_BYTES() more: 275 KB in all.
+ * Cost     per event undistort + window + rotate, per slice a new orientation; for images a vote per event, and per window
+ *          their rendering within the pull that closes it: docs/performance.md counts them.
  * Numeric  integers only, bit-exact on every target. The output does not depend on how the input is split into calls,
  *          as long as no prediction is needed.
  * Time     Events in order (equal times allowed), each sensor in order. An event whose time runs back is dropped and
