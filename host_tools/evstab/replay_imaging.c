@@ -140,6 +140,10 @@ bool evt_imaging_settle(evt_replay_t *r, const evt_replay_options_t *o, const ev
     if (o->baseline != NULL) { (void)parse_baseline(o->baseline, &p->velocity.keyframes); }
     if (!settle_on(r, o, config, lens_known, err)) { return false; }
 
+    /* Recorded poses leave nothing of the rotation; that nothing is rotated at all is not told by a small rate. */
+    if ((r->attitude == EVT_ATTITUDE_TRUTH) || (r->attitude == EVT_ATTITUDE_NONE)) {
+        p->velocity.residual_rate_rad_s_q24 = 0;
+    }
     p->image = (p->velocity_on || wants_image) ? (evs_pipeline_image_t)image : EVS_PIPELINE_IMAGE_NONE;
     if (p->image == EVS_PIPELINE_IMAGE_SURFACE) {
         if (wants_warp && (warp != EVS_PIPELINE_WARP_NONE)) {

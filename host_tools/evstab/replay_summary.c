@@ -77,6 +77,7 @@ static void add_imaging(cJSON *to, const evs_pipeline_config_t *p)
     evt_json_text(to, "velocity", p->velocity_on ? "on" : "off");
     if (!p->velocity_on) { return; }
     evt_json_text(to, "method", evt_method_name(p->velocity.egomotion.method));
+    add_measure(to, "residual_rate_rad_s", evs_q_to_double(p->velocity.residual_rate_rad_s_q24, 24u));
     (void)cJSON_AddNumberToObject(to, "baseline_min_us", p->velocity.keyframes.baseline_min_us);
     (void)cJSON_AddNumberToObject(to, "baseline_max_us", p->velocity.keyframes.baseline_max_us);
     (void)cJSON_AddNumberToObject(to, "flow_target_px", p->velocity.keyframes.target_px_q4 / 16.0);
