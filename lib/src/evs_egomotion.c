@@ -203,6 +203,7 @@ static uint32_t kernel_scale(uint32_t noise)
 static uint32_t refine_rotation(const evs_egomotion_config_t *cfg, const evs_ego_call_t *call, evs_vec3_t *v,
                                 evs_ego_rotation_t *rot, evs_egomotion_result_t *result)
 {
+    const uint32_t fewer = (call->set.n + NOISE_VECTORS - 1u) / NOISE_VECTORS;
     uint32_t s = SCALE_WIDE;
     for (int i = 0; i < NARROW_STEPS; i++) {
         if ((i & 1) == 0) {
@@ -210,7 +211,7 @@ static uint32_t refine_rotation(const evs_egomotion_config_t *cfg, const evs_ego
             s = kernel_scale(noise);
             rot->prior = evs_ego_rotation_prior(&call->set, result, noise, cfg->rotation_sigma_rad_q28);
         }
-        if (!evs_ego_step_rotation(&call->set, result, s, v, rot)) { break; }
+        if (!evs_ego_step_rotation(&call->set, result, s, (i < 2) ? fewer : 1u, v, rot)) { break; }
         result->rotation_rad_q28 = rot->rad_q28;
         evs_ego_repack(&call->set, call->flow, call->n, result);
     }

@@ -337,8 +337,8 @@ typedef struct {
 evs_scaled_t evs_ego_rotation_prior(const evs_ego_set_t *set, const evs_egomotion_result_t *scale, uint32_t noise,
                                     int32_t sigma_rad_q28);
 /* As evs_ego_step(), for both. The set must be packed with rot->rad_q28 taken out. */
-bool evs_ego_step_rotation(const evs_ego_set_t *set, const evs_egomotion_result_t *scale, uint32_t s, evs_vec3_t *v_q30,
-                           evs_ego_rotation_t *rot);
+bool evs_ego_step_rotation(const evs_ego_set_t *set, const evs_egomotion_result_t *scale, uint32_t s, uint32_t stride,
+                           evs_vec3_t *v_q30, evs_ego_rotation_t *rot);
 /* As evs_ego_covariance(), with the rotation's share. */
 bool evs_ego_covariance_rotation(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint32_t s, uint32_t noise,
                                  evs_scaled_t prior, evs_scaled_t cov[3]);

@@ -8,17 +8,23 @@ enum { DIM = 5, N_TRIANGLE = DIM * (DIM + 1) / 2, SLOPE_MAX = (1 << 18) - 1 };
 /* --- joint steps ------------------------------------------------------------------------------------------------ */
 
 typedef struct {
-    int64_t h[N_TRIANGLE];         /* sum of w J J' */
-    int64_t g_q2[DIM];             /* sum of w r J */
-    int64_t z[EVS_EGO_CELLS][DIM]; /* the same by cells, in 4 steps^2 */
-    int64_t curvature;             /* sum of psi' |J|^2 over the two of v */
+    int64_t h[N_TRIANGLE]; /* sum of w J J' */
+    int64_t g_q2[DIM];     /* sum of w r J */
 } sums_t;
 
-static void add_up(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint32_t s, sums_t *sums)
+/* What tells the spread of the result. */
+typedef struct {
+    int64_t z[EVS_EGO_CELLS][DIM]; /* the gradient by cells, in 4 steps^2 */
+    int64_t curvature;             /* sum of psi' |J|^2 over the two of v */
+} spread_t;
+
+/* Sums over every stride-th vector; those of the spread where it is not NULL. */
+static void add_up(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint32_t s, uint32_t stride, sums_t *sums,
+                   spread_t *spread)
 {
     const evs_ego_loop_t loop = evs_ego_loop(set, f, s);
-    *sums = (sums_t){.curvature = 0};
-    for (uint32_t i = 0u; i < set->n; i++) {
+    *sums = (sums_t){.h = {0}};
+    for (uint32_t i = 0u; i < set->n; i += stride) {
         const evs_ego_vector_t *const p = &set->vec[i];
         evs_ego_pull_t a;
         if (!evs_ego_pull(set, p, &loop, &a)) { continue; }
@@ -29,15 +35,16 @@ static void add_up(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint32_t 
                 ((int64_t)rows.bv[k] * a.view.ax - (int64_t)rows.bu[k] * a.view.ay) >> (set->one_bits + 1u);
             j[2u + k] = evs_clamp(evs_sat32(across), -SLOPE_MAX, SLOPE_MAX);
         }
-        int64_t *const cell = sums->z[evs_ego_cell(set, p)];
         unsigned at = 0u;
         for (unsigned k = 0u; k < DIM; k++) {
-            const int32_t wj = evs_ego_weigh(a.weight_q30, a.inv, j[k]);
-            cell[k] += evs_ego_gradient(a.wr_q2, j[k]);
+            const int32_t wj = (k == 0u) ? a.k0 : ((k == 1u) ? a.k1 : evs_ego_weigh(a.weight_q30, a.inv, j[k]));
             sums->g_q2[k] += (int64_t)a.wr_q2 * j[k];
             for (unsigned l = 0u; l <= k; l++) { sums->h[at++] += (int64_t)wj * j[l]; }
-            if (k < 2u) { sums->curvature += (int64_t)evs_ego_bend(&a, wj) * j[k]; }
         }
+        if (spread == NULL) { continue; }
+        int64_t *const cell = spread->z[evs_ego_cell(set, p)];
+        for (unsigned k = 0u; k < DIM; k++) { cell[k] += evs_ego_gradient(a.wr_q2, j[k]); }
+        spread->curvature += (int64_t)evs_ego_bend(&a, a.k0) * j[0] + (int64_t)evs_ego_bend(&a, a.k1) * j[1];
     }
 }
 
@@ -55,8 +62,8 @@ evs_scaled_t evs_ego_rotation_prior(const evs_ego_set_t *set, const evs_egomotio
     return evs_scaled_mul(ratio, ratio);
 }
 
-bool evs_ego_step_rotation(const evs_ego_set_t *set, const evs_egomotion_result_t *scale, uint32_t s, evs_vec3_t *v_q30,
-                           evs_ego_rotation_t *rot)
+bool evs_ego_step_rotation(const evs_ego_set_t *set, const evs_egomotion_result_t *scale, uint32_t s, uint32_t stride,
+                           evs_vec3_t *v_q30, evs_ego_rotation_t *rot)
 {
     const evs_ego_frame_t f = evs_ego_frame(*v_q30);
     const evs_scaled_t unit = evs_ego_rotation_unit(set, scale);
@@ -64,7 +71,7 @@ bool evs_ego_step_rotation(const evs_ego_set_t *set, const evs_egomotion_result_
     sums_t sums;
     evs_scaled_t h[N_TRIANGLE];
     evs_scaled_t step[DIM];
-    add_up(set, &f, s, &sums);
+    add_up(set, &f, s, stride, &sums, NULL);
     for (unsigned i = 0u; i < N_TRIANGLE; i++) { h[i] = evs_scaled(sums.h[i], 0); }
     for (unsigned i = 0u; i < DIM; i++) { step[i] = evs_scaled(-sums.g_q2[i], -2); }
     for (unsigned k = 0u; k < 3u; k++) {
@@ -90,11 +97,12 @@ bool evs_ego_covariance_rotation(const evs_ego_set_t *set, const evs_ego_frame_t
     sums_t sums;
     evs_scaled_t h[N_TRIANGLE];
     evs_scaled_t m[N_TRIANGLE];
-    add_up(set, f, s, &sums);
-    if (sums.curvature <= 0) { return false; }
-    const evs_scaled_t kappa = evs_scaled_div(evs_scaled(sums.curvature, 0), evs_scaled(sums.h[0] + sums.h[2], 0));
+    spread_t spread = {.curvature = 0};
+    add_up(set, f, s, 1u, &sums, &spread);
+    if (spread.curvature <= 0) { return false; }
+    const evs_scaled_t kappa = evs_scaled_div(evs_scaled(spread.curvature, 0), evs_scaled(sums.h[0] + sums.h[2], 0));
     for (unsigned i = 0u; i < N_TRIANGLE; i++) { h[i] = evs_scaled_mul(evs_scaled(sums.h[i], 0), kappa); }
-    evs_ego_spread(&sums.z[0][0], DIM, m);
+    evs_ego_spread(&spread.z[0][0], DIM, m);
     const evs_scaled_t of_prior = evs_scaled_mul(prior, evs_scaled((int64_t)noise * noise + 1, 0));
     for (unsigned k = 0u; k < 3u; k++) {
         const unsigned at = (2u + k) * (3u + k) / 2u + 2u + k;
@@ -146,13 +154,15 @@ static bool fit_turn(const evs_ego_set_t *set, uint32_t stride, uint32_t s2, evs
     return true;
 }
 
-/* Fit a turn to every stride-th vector, at the scales of the median flow, half of it, and twice s. */
+/* Fit a turn to every stride-th vector, at the scales of the median flow, half of it, and twice s. The first three look
+ * at 128 of them at most. */
 static bool find_turn(const evs_ego_set_t *set, uint32_t stride, uint32_t s, evs_ego_turn_t *t)
 {
+    const uint32_t some = (set->n + EVS_EGO_SUBSET - 1u) / EVS_EGO_SUBSET;
     for (unsigned i = 0u; i < 4u; i++) {
         const uint32_t wide = (UINT32_C(1) << EVS_EGO_MEDIAN_BITS) >> i;
         const uint32_t scale = ((i < 2u) && (wide > s)) ? wide : s;
-        if (!fit_turn(set, stride, scale * scale, t)) { return false; }
+        if (!fit_turn(set, ((i < 3u) && (some > stride)) ? some : stride, scale * scale, t)) { return false; }
     }
     return true;
 }
