@@ -8,6 +8,8 @@
 #define WAIT_MAX_US UINT32_C(1000000)
 #define TAU_MAX_MS  UINT32_C(100000)
 
+#define VIEW_RATE_MAX_MRAD_S 1000u
+
 #define VOTES_PER_PX 12u /* of the tile that closes a window whose image shall be tracked */
 
 evs_pipeline_config_t evs_pipeline_config_default(const evs_camera_config_t *camera)
@@ -23,6 +25,7 @@ evs_pipeline_config_t evs_pipeline_config_default(const evs_camera_config_t *cam
                                        .attitude = evs_attitude_config_default(),
                                        .q_ci = evs_quat_identity(),
                                        .view_tau_ms = 10000u,
+                                       .view_rate_max_mrad_s = 4u,
                                        .track = evs_orientation_track_config_default(),
                                        .stabilize = evs_stabilize_config_default(&pinhole),
                                        .max_wait_us = 20000u,
@@ -61,7 +64,8 @@ static bool capacities_ok(const evs_pipeline_config_t *cfg)
            (cfg->camera.height_px >= 1u) && (cfg->camera.height_px <= EVS_SENSOR_MAX_PX) && (cfg->n_fifo >= 2u) &&
            (cfg->n_fifo <= FIFO_MAX) && (cfg->n_ring >= EVS_ORIENTATION_TRACK_MIN) && (cfg->n_ring <= FIFO_MAX) &&
            (cfg->n_batch >= 1u) && (cfg->n_batch <= cfg->n_fifo) && (cfg->max_wait_us <= WAIT_MAX_US) &&
-           (cfg->view_tau_ms <= TAU_MAX_MS) && (cfg->n_warp_events <= FIFO_MAX);
+           (cfg->view_tau_ms <= TAU_MAX_MS) && (cfg->view_rate_max_mrad_s <= VIEW_RATE_MAX_MRAD_S) &&
+           (cfg->n_warp_events <= FIFO_MAX);
 }
 
 static size_t n_tiles_of(const evs_pipeline_config_t *cfg)
@@ -191,6 +195,7 @@ evs_status_t evs_pipeline_init(evs_pipeline_t *p, const evs_pipeline_config_t *c
     p->tiles = evs_pipeline_take(&cursor, cfg->n_batch * sizeof p->tiles[0]);
     p->window_q_rc = evs_quat_identity();
     if (cfg->view_tau_ms > 0u) { p->view_per_us_q50 = (UINT64_C(1) << 50) / (cfg->view_tau_ms * UINT64_C(1000)); }
+    p->view_max_per_us_q62 = cfg->view_rate_max_mrad_s * ((UINT64_C(1) << 61) / UINT64_C(1000000000));
 
     evs_status_t status = evs_quat_normalize(cfg->q_ci, &p->cfg.q_ci);
     if (status == EVS_OK) { status = evs_attitude_init(&p->attitude, &cfg->attitude); }
@@ -201,32 +206,58 @@ evs_status_t evs_pipeline_init(evs_pipeline_t *p, const evs_pipeline_config_t *c
     return status; /* all were judged above */
 }
 
+static int32_t mean(int32_t a, int32_t b) { return (int32_t)evs_shr_r64((int64_t)a + b, 1); }
+
+/* Move q by the part step_q30 of its way to identity, but no component of its vector part by more than max_q30. */
+static evs_quat_t towards_identity(evs_quat_t q, int32_t step_q30, int32_t max_q30)
+{
+    const int32_t back_q30 = (q.w < 0) ? step_q30 : -step_q30; /* the shorter way round */
+    const evs_quat_t step = {EVS_ONE_Q30, evs_clamp(evs_q_mul(q.x, back_q30, 30), -max_q30, max_q30),
+                             evs_clamp(evs_q_mul(q.y, back_q30, 30), -max_q30, max_q30),
+                             evs_clamp(evs_q_mul(q.z, back_q30, 30), -max_q30, max_q30)};
+    evs_quat_t moved;
+    return (evs_quat_normalize(evs_quat_mul(step, q), &moved) == EVS_OK) ? moved : evs_quat_identity();
+}
+
 /*
- * Carry the view on by the rate, then move it towards the attitude by dt / tau of what is between them. The view takes
- * over the attitude as it is when horizon or north have just been found, and after a gap in the gyro.
+ * Carry the view on by the mean of this rate and the one before, then move it towards the attitude by dt / tau of what is
+ * between them. What has come between them while the filter settled is a matter of where it began: the view keeps it, and
+ * gives it up slowly, since to a camera that flies a turn that never happened looks like a motion. The view takes over
+ * the attitude as it is when horizon or north have just been found, and after a gap in the gyro.
  */
 static void follow_attitude(evs_pipeline_t *p, uint32_t t_us, evs_quat_t attitude_wc, evs_vec3_t rate_rad_s_q24)
 {
     const int32_t dt_us = evs_time_diff_us(t_us, p->view_t_us);
-    const uint32_t known = evs_attitude_flags(&p->attitude) & (EVS_ATTITUDE_TILT_KNOWN | EVS_ATTITUDE_HEADING_KNOWN);
+    const uint32_t flags = evs_attitude_flags(&p->attitude);
+    const uint32_t known = flags & (EVS_ATTITUDE_TILT_KNOWN | EVS_ATTITUDE_HEADING_KNOWN);
     const bool follow = (p->cfg.view_tau_ms > 0u) && (known == p->view_known) && (dt_us > 0) &&
                         ((uint32_t)dt_us <= p->cfg.track.max_gap_us);
+    const evs_vec3_t rate = {mean(p->view_rate_q24.x, rate_rad_s_q24.x), mean(p->view_rate_q24.y, rate_rad_s_q24.y),
+                             mean(p->view_rate_q24.z, rate_rad_s_q24.z)};
     p->view_t_us = t_us;
     p->view_known = known;
+    p->view_rate_q24 = rate_rad_s_q24;
     if (!follow) {
         p->view_q_wc = attitude_wc;
+        p->view_kept_q = evs_quat_identity();
         return;
     }
-    const evs_quat_t carried =
-        evs_quat_mul(p->view_q_wc, evs_quat_from_rotvec(evs_rotvec_of_rate(rate_rad_s_q24, dt_us)));
-    /* Half of what is between them is the vector part of the quotient, as long as it is small; and if not, it shrinks. */
-    const evs_quat_t apart = evs_quat_mul(attitude_wc, evs_quat_conj(carried));
+    const evs_quat_t carried = evs_quat_mul(p->view_q_wc, evs_quat_from_rotvec(evs_rotvec_of_rate(rate, dt_us)));
     const uint64_t part_q30 = ((uint64_t)(uint32_t)dt_us * p->view_per_us_q50) >> 20;
     const int32_t step_q30 = (part_q30 < (uint32_t)EVS_ONE_Q30) ? (int32_t)part_q30 : EVS_ONE_Q30;
-    const int32_t towards_q30 = (apart.w < 0) ? -step_q30 : step_q30; /* the shorter way round */
-    const evs_quat_t step = {EVS_ONE_Q30, evs_q_mul(apart.x, towards_q30, 30), evs_q_mul(apart.y, towards_q30, 30),
-                             evs_q_mul(apart.z, towards_q30, 30)};
-    if (evs_quat_normalize(evs_quat_mul(step, carried), &p->view_q_wc) != EVS_OK) { p->view_q_wc = attitude_wc; }
+    if ((flags & EVS_ATTITUDE_SETTLING) != 0u) {
+        p->view_kept_q = evs_quat_mul(attitude_wc, evs_quat_conj(carried));
+    } else if (p->cfg.view_rate_max_mrad_s == 0u) {
+        p->view_kept_q = evs_quat_identity();
+    } else {
+        const uint64_t max_q30 = ((uint64_t)(uint32_t)dt_us * p->view_max_per_us_q62) >> 32;
+        p->view_kept_q = towards_identity(p->view_kept_q, step_q30,
+                                          (max_q30 < (uint32_t)EVS_ONE_Q30) ? (int32_t)max_q30 : EVS_ONE_Q30);
+    }
+    const evs_quat_t goal_wc = evs_quat_mul(evs_quat_conj(p->view_kept_q), attitude_wc);
+    const evs_quat_t behind = evs_quat_mul(carried, evs_quat_conj(goal_wc));
+    const evs_quat_t view_wc = evs_quat_mul(towards_identity(behind, step_q30, EVS_ONE_Q30), goal_wc);
+    if (evs_quat_normalize(view_wc, &p->view_q_wc) != EVS_OK) { p->view_q_wc = attitude_wc; }
 }
 
 static evs_status_t push_orientation(evs_pipeline_t *p, const evs_orientation_t *sample)

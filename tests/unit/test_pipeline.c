@@ -4,6 +4,7 @@
 #include "model.h"
 #include "unity.h"
 
+#include <math.h>
 #include <string.h>
 
 enum { W = 64, H = 48, STEP = 1, N_FIFO = 256, N_RING = 8, N_BATCH = 32, COLS = 4, ROWS = 3 };
@@ -407,11 +408,20 @@ static void test_imu_samples_become_camera_orientations(void)
     TEST_ASSERT_EQUAL_INT(EVS_ERR_NULL, evs_pipeline_newest_orientation(&p, NULL));
 }
 
-/* Switched on in motion: the filter starts 0.4 rad off and learns better; the view must turn by what the gyro says. */
-static double view_error_after(uint32_t view_tau_ms, double *apart)
+/* The rotation from one orientation to the other, in rad. */
+static double between(evs_quat_t a, evs_quat_t b) { return model_angle(model_from_fixed(a), model_from_fixed(b)); }
+
+/*
+ * Switched on in motion: the filter starts 0.4 rad off and learns better; the view must turn by what the gyro says, from
+ * the time at which somebody looks first to 1 s. Then the carrier comes to rest.
+ * @return how far it did not. The angle between attitude and view in *apart.
+ */
+static double view_error_after_1_s(uint32_t view_tau_ms, uint16_t rate_max_mrad_s, double *apart)
 {
     evs_pipeline_config_t cfg = config(EVS_PIPELINE_IMU);
     cfg.view_tau_ms = view_tau_ms;
+    cfg.view_rate_max_mrad_s = rate_max_mrad_s;
+    cfg.attitude.learn_bias = false;
     init(&cfg);
     const evs_event_t ev = event_at(1000u);
     evs_orientation_t before = {0};
@@ -427,10 +437,23 @@ static double view_error_after(uint32_t view_tau_ms, double *apart)
         }
     }
     TEST_ASSERT_EQUAL_INT(EVS_OK, evs_pipeline_newest_orientation(&p, &at));
-    const model_quat_t attitude = model_from_fixed(evs_attitude_orientation(evs_pipeline_attitude(&p)));
-    *apart = model_angle(attitude, model_from_fixed(at.q_wc));
+    *apart = between(evs_attitude_orientation(evs_pipeline_attitude(&p)), at.q_wc);
     const model_quat_t turned = model_mul(model_conj(model_from_fixed(before.q_wc)), model_from_fixed(at.q_wc));
     return model_angle(turned, model_exp(0, 0, 0.5 * 0.997));
+}
+
+/* Rest, samples at 100 Hz after from_ms up to to_ms; returns by how much the view turns. */
+static double view_turns_at_rest(uint32_t from_ms, uint32_t to_ms)
+{
+    evs_orientation_t before = {0};
+    evs_orientation_t at = {0};
+    TEST_ASSERT_EQUAL_INT(EVS_OK, evs_pipeline_newest_orientation(&p, &before));
+    for (uint32_t ms = from_ms + 10u; ms <= to_ms; ms += 10u) {
+        evs_pipeline_push_accel(&p, 1000u * ms, evs_vec3_from_double(0, 0, 9.81, 20));
+        evs_pipeline_push_gyro(&p, 1000u * ms, evs_vec3_from_double(0, 0, 0, 24));
+    }
+    TEST_ASSERT_EQUAL_INT(EVS_OK, evs_pipeline_newest_orientation(&p, &at));
+    return between(before.q_wc, at.q_wc);
 }
 
 static void test_view_turns_by_the_gyro_while_the_attitude_still_settles(void)
@@ -438,14 +461,63 @@ static void test_view_turns_by_the_gyro_while_the_attitude_still_settles(void)
     n_out = 0u;
     n_ends = 0u;
     double apart;
-    const double at_once = view_error_after(0u, &apart);
+    const double at_once = view_error_after_1_s(0u, 0u, &apart);
     TEST_ASSERT_DOUBLE_WITHIN(1e-7, 0.0, apart);
-    const double smooth = view_error_after(10000u, &apart);
-    TEST_ASSERT_TRUE(apart > 0.05);
     TEST_ASSERT_TRUE(at_once > 0.1);
-    TEST_ASSERT_TRUE(smooth < 0.04); /* a tenth of the 0.4 rad at most: 1 s of 10 */
-    const double slow = view_error_after(100000u, &apart);
-    TEST_ASSERT_TRUE(slow < smooth);
+    const double held = view_error_after_1_s(10000u, 4u, &apart);
+    TEST_ASSERT_TRUE(apart > 0.05);
+    TEST_ASSERT_TRUE(held < 1e-5);
+}
+
+static void test_view_gives_up_slowly_what_it_kept_while_the_attitude_settled(void)
+{
+    const uint16_t rate_max_mrad_s[3] = {4u, 2u, 0u};
+    double turned[3];
+    for (int k = 0; k < 3; k++) {
+        double apart;
+        (void)view_error_after_1_s(10000u, rate_max_mrad_s[k], &apart);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.0025,
+                                  view_turns_at_rest(1000u, 2900u)); /* 0.5 rad/s, ebbing away over 10 ms */
+        turned[k] = view_turns_at_rest(2900u, 5900u);                /* 3 s after the start the attitude has settled */
+        if (k == 2) { break; }
+        (void)view_turns_at_rest(5900u, 40900u);
+        turned[k] = view_turns_at_rest(40900u, 41900u);
+        TEST_ASSERT_TRUE(view_turns_at_rest(42100u, 42110u) > 0.1);  /* after a gap it takes over the attitude, */
+        TEST_ASSERT_TRUE(view_turns_at_rest(42110u, 43110u) < 1e-5); /* and keeps nothing */
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(0.0002, 0.004, turned[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(0.0002, 0.002, turned[1]);
+    TEST_ASSERT_TRUE(turned[2] > 0.05); /* a quarter of 0.37 rad */
+}
+
+static void test_view_takes_over_later_corrections_with_its_time_constant(void)
+{
+    const evs_pipeline_config_t cfg = config(EVS_PIPELINE_IMU);
+    init(&cfg);
+    evs_pipeline_push_accel(&p, 0u, evs_vec3_from_double(0, 0, 9.81, 20));
+    evs_pipeline_push_gyro(&p, 0u, evs_vec3_from_double(0, 0, 0, 24));
+    (void)view_turns_at_rest(0u, 4000u);
+    TEST_ASSERT_EQUAL_INT(EVS_OK, evs_attitude_set_orientation(&p.attitude, model_to_fixed(model_exp(0, 0, 0.5))));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.5, view_turns_at_rest(4000u, 4010u)); /* north is found: at once */
+    TEST_ASSERT_EQUAL_INT(EVS_OK, evs_attitude_set_orientation(&p.attitude, model_to_fixed(model_exp(0, 0, 0.6))));
+    TEST_ASSERT_DOUBLE_WITHIN(0.0001, 0.1 * (1.0 - exp(-0.1)), view_turns_at_rest(4010u, 5010u));
+}
+
+static void test_view_takes_a_rate_between_two_samples_as_a_straight_line(void)
+{
+    evs_pipeline_config_t cfg = config(EVS_PIPELINE_IMU);
+    cfg.attitude.mode = EVS_ATTITUDE_GYRO_ONLY;
+    init(&cfg);
+    evs_orientation_t start = {0};
+    evs_orientation_t at = {0};
+    for (uint32_t i = 0; i <= 100u; i++) { /* 100 Hz, so that an interval counts */
+        const double rate_rad_s = 2.0 * (0.01 * i);
+        evs_pipeline_push_gyro(&p, 10000u * i, evs_vec3_from_double(0, rate_rad_s, 0, 24));
+        if (i == 0u) { TEST_ASSERT_EQUAL_INT(EVS_OK, evs_pipeline_newest_orientation(&p, &start)); }
+    }
+    TEST_ASSERT_EQUAL_INT(EVS_OK, evs_pipeline_newest_orientation(&p, &at));
+    const model_quat_t turned = model_mul(model_conj(model_from_fixed(start.q_wc)), model_from_fixed(at.q_wc));
+    TEST_ASSERT_DOUBLE_WITHIN(0.001, 0.0, model_angle(turned, model_exp(0, 1.0, 0))); /* by the last rate alone: 0.01 */
 }
 
 static void test_table_in_flash_gives_the_bits_of_a_table_built_here(void)
@@ -486,8 +558,8 @@ static void test_table_in_flash_gives_the_bits_of_a_table_built_here(void)
 static void test_init_refuses_what_any_module_refuses_and_leaves_the_context_alone(void)
 {
     const evs_pipeline_config_t good = config(EVS_PIPELINE_IMU);
-    evs_pipeline_config_t bad[15];
-    for (size_t i = 0; i < 15u; i++) { bad[i] = good; }
+    evs_pipeline_config_t bad[16];
+    for (size_t i = 0; i < 16u; i++) { bad[i] = good; }
     bad[0].camera.fx_q16 = 0;
     bad[1].table_step_px = 3u;
     bad[2].n_cols = 0u;
@@ -503,7 +575,8 @@ static void test_init_refuses_what_any_module_refuses_and_leaves_the_context_alo
     bad[12].n_batch = good.n_fifo + 1u;
     bad[13].camera.width_px = 0u;
     bad[14].view_tau_ms = 100001u;
-    for (size_t i = 0; i < 15u; i++) {
+    bad[15].view_rate_max_mrad_s = 1001u;
+    for (size_t i = 0; i < 16u; i++) {
         p.slice_first_us = 77u;
         TEST_ASSERT_EQUAL_INT(EVS_ERR_ARG, evs_pipeline_init(&p, &bad[i], memory, BYTES));
         TEST_ASSERT_EQUAL_UINT32(77u, p.slice_first_us);
@@ -533,6 +606,9 @@ int main(void)
     RUN_TEST(test_full_fifo_takes_no_more_and_never_locks_up);
     RUN_TEST(test_imu_samples_become_camera_orientations);
     RUN_TEST(test_view_turns_by_the_gyro_while_the_attitude_still_settles);
+    RUN_TEST(test_view_gives_up_slowly_what_it_kept_while_the_attitude_settled);
+    RUN_TEST(test_view_takes_over_later_corrections_with_its_time_constant);
+    RUN_TEST(test_view_takes_a_rate_between_two_samples_as_a_straight_line);
     RUN_TEST(test_table_in_flash_gives_the_bits_of_a_table_built_here);
     RUN_TEST(test_init_refuses_what_any_module_refuses_and_leaves_the_context_alone);
     return UNITY_END();

@@ -18,7 +18,8 @@
  *          The view is held by the gyro. The attitude filter also corrects itself, by tens of degrees a second when it
  *          is switched on in motion; in the view that would be a rotation that never happened. So once horizon and north are
  *          found, the orientation of the view integrates the filter's unbiased rate, and approaches the filter's
- *          orientation with the time constant view_tau_ms.
+ *          orientation with the time constant view_tau_ms. What the filter finds out while it settles would still be a
+ *          turn of degrees a second then: that part the view takes over by at most view_rate_max_mrad_s.
  * Memory   one evs_pipeline_t and one block of caller memory: evs_pipeline_bytes(), or for a static array
  *          EVS_PIPELINE_BYTES(). For 240 x 180 with a grid of step 8, 34 x 26 tiles, 2048 events, 32 orientations and
  *          batches of 128: 23432 bytes, and the context of about 1 KB. With images and the direction of flight
@@ -83,12 +84,15 @@ typedef struct {                /** Settings; copied by evs_pipeline_init(). */
                                      per event. Default false. */
     uint16_t n_cols;            /**< Tiles of the area count. Default 34 x 26. */
     uint16_t n_rows;
-    evs_window_config_t window;           /**< Default: area count, threshold 200. */
-    evs_pipeline_source_t source;         /**< Default IMU. */
-    evs_attitude_config_t attitude;       /**< Source IMU. */
-    evs_quat_t q_ci;                      /**< Source IMU: camera from IMU, unit. Default identity. */
-    uint32_t view_tau_ms;                 /**< Source IMU: time constant with which the view takes over corrections of
+    evs_window_config_t window;     /**< Default: area count, threshold 200. */
+    evs_pipeline_source_t source;   /**< Default IMU. */
+    evs_attitude_config_t attitude; /**< Source IMU. */
+    evs_quat_t q_ci;                /**< Source IMU: camera from IMU, unit. Default identity. */
+    uint32_t view_tau_ms;           /**< Source IMU: time constant with which the view takes over corrections of
                                                the attitude, see Model. 0: at once. [0, 100000], default 10000. */
+    uint16_t view_rate_max_mrad_s;  /**< Source IMU: how fast the view gives up, per axis, what it keeps from before
+                                               the attitude had settled, see Model. 0: at once, then by view_tau_ms.
+                                               [0, 1000], default 4. */
     evs_orientation_track_config_t track; /**< Among others the time offset of the orientations against the events. */
     evs_stabilize_config_t stabilize;     /**< Its pinhole is set from the camera by evs_pipeline_init(). */
     uint32_t max_wait_us;                 /**< Longest wait for an orientation, by the events' clock. [0, 10^6], default
@@ -161,8 +165,11 @@ typedef struct { /** Context. A complete type only so that you can place it: eve
     evs_attitude_t attitude;
     evs_quat_t view_q_wc; /* newest orientation of the view, and its time */
     uint32_t view_t_us;
-    uint32_t view_known;      /* whether horizon and north were, then: flags of the attitude */
-    uint64_t view_per_us_q50; /* 1 / view_tau_ms */
+    uint32_t view_known;          /* whether horizon and north were, then: flags of the attitude */
+    evs_vec3_t view_rate_q24;     /* of the camera, then */
+    evs_quat_t view_kept_q;       /* attitude from view: what the view keeps to itself */
+    uint64_t view_per_us_q50;     /* 1 / view_tau_ms */
+    uint64_t view_max_per_us_q62; /* half of view_rate_max_mrad_s */
     evs_orientation_track_t track;
     evs_undistort_t undistort;
     evs_window_t window;
