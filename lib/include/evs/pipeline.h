@@ -245,8 +245,8 @@ typedef struct { /** Context. A complete type only so that you can place it: eve
 evs_pipeline_config_t evs_pipeline_config_default(const evs_camera_config_t *camera);
 
 /**
- * Defaults for measuring the direction of flight: images of warped events, no warp, and windows by area that close with
- * the 12th event per pixel of a tile, after 5 to 50 ms.
+ * Defaults for measuring the direction of flight: images of warped events, no warp, windows by area that close with the
+ * 12th event per pixel of a tile, after 5 to 50 ms, and a residual rotation rate of 0.002 rad/s.
  */
 evs_pipeline_config_t evs_pipeline_config_velocity(const evs_camera_config_t *camera);
 
