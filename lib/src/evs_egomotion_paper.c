@@ -220,16 +220,13 @@ static evs_vec3_t downhill(const paper_t *e, evs_vec3_t v, uint64_t least)
 
 /* --- spread ----------------------------------------------------------------------------------------------------- */
 
-typedef struct {
-    int64_t h[N_TRIANGLE];         /* sum of w^2 J J' */
-    int64_t z[EVS_EGO_CELLS][DIM]; /* sum of w^2 r J by cells */
-} sums_t;
-
-static void add_up(const paper_t *e, const evs_ego_frame_t *f, const evs_ego_turn_t *turn, sums_t *sums)
+/* Sums of w^2 J J', and of w^2 r J by cells, for the first dim unknowns. */
+static void add_up(const paper_t *e, const evs_ego_frame_t *f, const evs_ego_turn_t *turn, unsigned dim, int64_t *h,
+                   int64_t *z)
 {
     const evs_ego_set_t *const set = e->set;
     const evs_ego_loop_t loop = evs_ego_loop(set, f, 1u << EVS_EGO_MEDIAN_BITS); /* for its directions */
-    *sums = (sums_t){.h = {0}};
+    for (unsigned k = 0u; k < dim * (dim + 1u) / 2u; k++) { h[k] = 0; }
     for (uint32_t i = 0u; i < set->n; i++) {
         const evs_ego_rows_t rows = evs_ego_rows(set, &set->vec[i]);
         int32_t left[2];
@@ -244,15 +241,15 @@ static void add_up(const paper_t *e, const evs_ego_frame_t *f, const evs_ego_tur
         const evs_ego_slope_t slope = evs_ego_slope(set, &p, w.d, inv, loop.b0, loop.b1);
         const int32_t wr_q2 = evs_mul_hi((int32_t)weight_q30, evs_ego_over_a2_q2(set, w.c, inv) * 4);
         int32_t j[DIM] = {slope.j0, slope.j1, 0, 0, 0};
-        for (unsigned k = 0u; e->joint && (k < 3u); k++) {
+        for (unsigned k = 0u; k + 2u < dim; k++) {
             const int64_t across = ((int64_t)rows.bv[k] * w.ax - (int64_t)rows.bu[k] * w.ay) >> (set->one_bits + 1u);
             j[2u + k] = evs_clamp(evs_sat32(across), -SLOPE_MAX, SLOPE_MAX);
         }
         unsigned at = 0u;
-        for (unsigned k = 0u; k < DIM; k++) {
+        for (unsigned k = 0u; k < dim; k++) {
             const int32_t wj = evs_ego_weigh(weight_q30, inv, j[k]);
-            sums->z[evs_ego_cell(set, &p)][k] += evs_ego_gradient(wr_q2, j[k]);
-            for (unsigned l = 0u; l <= k; l++) { sums->h[at++] += (int64_t)wj * j[l]; }
+            z[dim * evs_ego_cell(set, &p) + k] += evs_ego_gradient(wr_q2, j[k]);
+            for (unsigned l = 0u; l <= k; l++) { h[at++] += (int64_t)wj * j[l]; }
         }
     }
 }
@@ -301,15 +298,12 @@ bool evs_ego_paper(const evs_ego_set_t *set, bool joint, uint32_t *likelihood, e
                          turn_to_rad_q28(result, turn.w_q8[2])};
     }
     const evs_ego_frame_t f = evs_ego_frame(v);
-    sums_t sums;
+    int64_t sums[N_TRIANGLE];
     evs_scaled_t h[N_TRIANGLE];
     evs_scaled_t m[N_TRIANGLE];
-    int64_t z[EVS_EGO_CELLS * DIM];
-    add_up(&e, &f, &turn, &sums);
-    for (unsigned k = 0u; k < N_TRIANGLE; k++) { h[k] = evs_scaled(sums.h[k], 0); }
-    for (unsigned c = 0u; c < EVS_EGO_CELLS; c++) {
-        for (unsigned k = 0u; k < dim; k++) { z[c * dim + k] = sums.z[c][k]; }
-    }
+    int64_t *const z = evs_ego_cells(set, dim);
+    add_up(&e, &f, &turn, dim, sums, z);
+    for (unsigned k = 0u; k < dim * (dim + 1u) / 2u; k++) { h[k] = evs_scaled(sums[k], 0); }
     evs_ego_spread(z, dim, m);
     return evs_ego_sandwich(h, m, dim, cov);
 }

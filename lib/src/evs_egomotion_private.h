@@ -322,7 +322,10 @@ bool evs_ego_covariance(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint
 /* The first two rows and columns of H^-1 M H^-1, as above; lower triangles by rows. False: H is singular. */
 bool evs_ego_sandwich(const evs_scaled_t *h, const evs_scaled_t *m, unsigned dim, evs_scaled_t cov[3]);
 
-/* Variance of the gradient, from its sums z[EVS_EGO_CELLS][dim] over the cells. */
+/* Room for the sums z[EVS_EGO_CELLS][dim] of the gradient over the cells, cleared. It takes the place of the subset,
+ * which nobody needs after the search. */
+int64_t *evs_ego_cells(const evs_ego_set_t *set, unsigned dim);
+/* Variance of the gradient, from these sums. */
 void evs_ego_spread(const int64_t *z, unsigned dim, evs_scaled_t *m);
 
 /* --- evs_egomotion_rotation.c --- */

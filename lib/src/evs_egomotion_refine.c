@@ -109,6 +109,17 @@ static evs_scaled_t form(const evs_scaled_t *m, const evs_scaled_t *x, const evs
     return sum;
 }
 
+EVS_STATIC_ASSERT(EVS_EGO_CELLS *EVS_SCALED_DIM_MAX * sizeof(int64_t) + 7u <= sizeof(evs_ego_subset_t),
+                  "the cells fit, wherever an 8-byte boundary lies");
+
+int64_t *evs_ego_cells(const evs_ego_set_t *set, unsigned dim)
+{
+    unsigned char *const at = (unsigned char *)set->subset;
+    int64_t *const z = (int64_t *)(void *)(at + ((8u - ((uintptr_t)at & 7u)) & 7u));
+    memset(z, 0, EVS_EGO_CELLS * dim * sizeof z[0]);
+    return z;
+}
+
 void evs_ego_spread(const int64_t *z, unsigned dim, evs_scaled_t *m)
 {
     int32_t n_used = 0;
@@ -149,9 +160,9 @@ bool evs_ego_covariance(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint
 {
     const evs_ego_loop_t loop = evs_ego_loop(set, f, s);
     int64_t h00 = 0, h01 = 0, h11 = 0;
-    int64_t curvature = 0;               /* sum of psi' |J|^2: the trace of the true Hessian */
-    int64_t z[EVS_EGO_CELLS][2] = {{0}}; /* the gradient, by cells */
-    uint64_t spread = 0u;                /* sum of its squares, vector by vector */
+    int64_t curvature = 0;                     /* sum of psi' |J|^2: the trace of the true Hessian */
+    int64_t *const z = evs_ego_cells(set, 2u); /* the gradient, by cells */
+    uint64_t spread = 0u;                      /* sum of its squares, vector by vector */
     for (uint32_t i = 0u; i < set->n; i++) {
         evs_ego_pull_t a;
         if (!evs_ego_pull(set, &set->vec[i], &loop, &a)) { continue; }
@@ -161,7 +172,7 @@ bool evs_ego_covariance(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint
         curvature += (int64_t)evs_ego_bend(&a, a.k0) * a.j.j0 + (int64_t)evs_ego_bend(&a, a.k1) * a.j.j1;
         const int32_t z0 = evs_ego_gradient(a.wr_q2, a.j.j0);
         const int32_t z1 = evs_ego_gradient(a.wr_q2, a.j.j1);
-        int64_t *const cell = z[evs_ego_cell(set, &set->vec[i])];
+        int64_t *const cell = z + 2u * evs_ego_cell(set, &set->vec[i]);
         cell[0] += z0;
         cell[1] += z1;
         spread += (uint64_t)((int64_t)z0 * z0) + (uint64_t)((int64_t)z1 * z1);
@@ -173,7 +184,7 @@ bool evs_ego_covariance(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint
     const evs_scaled_t h[3] = {evs_scaled_mul(evs_scaled(h00, 0), kappa), evs_scaled_mul(evs_scaled(h01, 0), kappa),
                                evs_scaled_mul(evs_scaled(h11, 0), kappa)};
     evs_scaled_t m[3];
-    evs_ego_spread(&z[0][0], 2u, m);
+    evs_ego_spread(z, 2u, m);
     /* cells are few: should chance have made their sums small, believe the vectors */
     const evs_scaled_t at_least = evs_scaled((int64_t)(spread >> 1), 5);
     const evs_scaled_t trace = evs_scaled_add(m[0], m[2]);

@@ -14,8 +14,8 @@ typedef struct {
 
 /* What tells the spread of the result. */
 typedef struct {
-    int64_t z[EVS_EGO_CELLS][DIM]; /* the gradient by cells, in 4 steps^2 */
-    int64_t curvature;             /* sum of psi' |J|^2 over the two of v */
+    int64_t *z;        /* the gradient by cells, in 4 steps^2 */
+    int64_t curvature; /* sum of psi' |J|^2 over the two of v */
 } spread_t;
 
 /* Sums over every stride-th vector; those of the spread where it is not NULL. */
@@ -42,7 +42,7 @@ static void add_up(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint32_t 
             for (unsigned l = 0u; l <= k; l++) { sums->h[at++] += (int64_t)wj * j[l]; }
         }
         if (spread == NULL) { continue; }
-        int64_t *const cell = spread->z[evs_ego_cell(set, p)];
+        int64_t *const cell = spread->z + DIM * evs_ego_cell(set, p);
         for (unsigned k = 0u; k < DIM; k++) { cell[k] += evs_ego_gradient(a.wr_q2, j[k]); }
         spread->curvature += (int64_t)evs_ego_bend(&a, a.k0) * j[0] + (int64_t)evs_ego_bend(&a, a.k1) * j[1];
     }
@@ -97,12 +97,12 @@ bool evs_ego_covariance_rotation(const evs_ego_set_t *set, const evs_ego_frame_t
     sums_t sums;
     evs_scaled_t h[N_TRIANGLE];
     evs_scaled_t m[N_TRIANGLE];
-    spread_t spread = {.curvature = 0};
+    spread_t spread = {.z = evs_ego_cells(set, DIM), .curvature = 0};
     add_up(set, f, s, 1u, &sums, &spread);
     if (spread.curvature <= 0) { return false; }
     const evs_scaled_t kappa = evs_scaled_div(evs_scaled(spread.curvature, 0), evs_scaled(sums.h[0] + sums.h[2], 0));
     for (unsigned i = 0u; i < N_TRIANGLE; i++) { h[i] = evs_scaled_mul(evs_scaled(sums.h[i], 0), kappa); }
-    evs_ego_spread(&spread.z[0][0], DIM, m);
+    evs_ego_spread(spread.z, DIM, m);
     const evs_scaled_t of_prior = evs_scaled_mul(prior, evs_scaled((int64_t)noise * noise + 1, 0));
     for (unsigned k = 0u; k < 3u; k++) {
         const unsigned at = (2u + k) * (3u + k) / 2u + 2u + k;
