@@ -292,22 +292,30 @@ static size_t pick(const evs_corner_t *cells, size_t n, uint32_t floor, evs_corn
     return n_out;
 }
 
-size_t evs_corners_find(evs_corners_t *corners, const evs_image_t *image, evs_corner_t *out, size_t max)
+void evs_corners_begin(evs_corners_t *corners, const evs_image_t *image)
 {
-    EVS_ASSERT((corners != NULL) && (image != NULL) && (image->px != NULL) && ((out != NULL) || (max == 0u)));
+    EVS_ASSERT((corners != NULL) && (image != NULL) && (image->px != NULL));
     EVS_ASSERT((image->width_px == corners->cfg.width_px) && (image->height_px == corners->cfg.height_px));
-    const size_t w = corners->cfg.width_px;
-    const size_t h = corners->cfg.height_px;
-    const size_t cell_px = corners->cfg.cell_px;
-    const size_t n_cells = (size_t)corners->n_columns * corners->n_rows;
-    if ((w <= 2u * MARGIN) || (h <= 2u * MARGIN) || (max == 0u)) { return 0u; }
+    const evs_corners_config_t *const cfg = &corners->cfg;
+    const bool has_blocks = (cfg->width_px > 2u * MARGIN) && (cfg->height_px > 2u * MARGIN);
+    corners->image = *image;
+    corners->y_next = has_blocks ? 1u : cfg->height_px;
+    corners->highest = 0u;
+    corners->floor = 0u;
+    memset(corners->memory, 0, EVS_CORNERS_BYTES(cfg->width_px, cfg->height_px, cfg->cell_px));
+}
 
+bool evs_corners_scan(evs_corners_t *corners, size_t n_rows)
+{
+    EVS_ASSERT(corners != NULL);
+    const size_t w = corners->cfg.width_px;
+    const size_t cell_px = corners->cfg.cell_px;
+    const size_t y_end = corners->cfg.height_px - 1u; /* the last row has no gradient */
+    if (corners->y_next >= y_end) { return true; }
+    const size_t y_stop = (n_rows < y_end - corners->y_next) ? corners->y_next + n_rows : y_end;
     const parts_t p = divide_memory(corners);
-    memset(corners->memory, 0, EVS_CORNERS_BYTES(w, h, cell_px));
-    uint32_t highest = 0u;
-    uint32_t floor = 0u;
-    for (size_t y = 1u; y < h - 1u; y++) {
-        add_row(&p, image, y);
+    for (size_t y = corners->y_next; y < y_stop; y++) {
+        add_row(&p, &corners->image, y);
         if (y < MARGIN + 2u) { continue; }
         const size_t y_centre = y - 2u;
         evs_corner_t *cell = p.cells + y_centre / cell_px * corners->n_columns;
@@ -316,10 +324,26 @@ size_t evs_corners_find(evs_corners_t *corners, const evs_image_t *image, evs_co
             const size_t begin = (left < MARGIN) ? MARGIN : left;
             const size_t end = (right < w - MARGIN) ? right : w - MARGIN;
             if (begin < end) {
-                score_row_of_cell(&p, begin, end, y_centre, cell, &floor, &highest, corners->cfg.min_permille);
+                score_row_of_cell(&p, begin, end, y_centre, cell, &corners->floor, &corners->highest,
+                                  corners->cfg.min_permille);
             }
             cell++;
         }
     }
-    return pick(p.cells, n_cells, floor, out, max);
+    corners->y_next = (uint16_t)y_stop;
+    return y_stop == y_end;
+}
+
+size_t evs_corners_take(const evs_corners_t *corners, evs_corner_t *out, size_t max)
+{
+    EVS_ASSERT((corners != NULL) && ((out != NULL) || (max == 0u)));
+    if (max == 0u) { return 0u; }
+    return pick(corners->memory, (size_t)corners->n_columns * corners->n_rows, corners->floor, out, max);
+}
+
+size_t evs_corners_find(evs_corners_t *corners, const evs_image_t *image, evs_corner_t *out, size_t max)
+{
+    evs_corners_begin(corners, image);
+    (void)evs_corners_scan(corners, corners->cfg.height_px);
+    return evs_corners_take(corners, out, max);
 }

@@ -14,6 +14,8 @@ enum { LOOK_PX = 12, LOOK_STEP_PX = 4 };
 
 #define INVALID (EVS_VELOCITY_FEW | EVS_VELOCITY_STILL | EVS_VELOCITY_UNSOLVED | EVS_VELOCITY_UNLIKE)
 
+#define ROWS_PER_TRACK 3u /* of the search for corners: they take as long as a track */
+
 enum { STAGE_IDLE = 0, STAGE_CORNERS, STAGE_PYRAMIDS, STAGE_TRACKS, STAGE_SOLVE };
 
 /* --- settings and memory ------------------------------------------------------------------------------------------ */
@@ -267,17 +269,24 @@ evs_status_t evs_velocity_begin(evs_velocity_t *v, const evs_velocity_image_t *i
                                       .flags = turned ? EVS_VELOCITY_TURNED : 0u,
                                       .q_wr = image->q_wr};
     look_up_orientation(v);
+    evs_corners_begin(&v->corners, &newest);
     v->stage = STAGE_CORNERS;
     return EVS_OK;
 }
 
-/* Corners of the newest image, and for each where it was in the older one if the flow has stayed what it was. */
-static void find_corners(evs_velocity_t *v)
+/* Some rows more in search of corners, about as much work as max_tracks tracks; true when all are done. */
+static bool scan_some(evs_velocity_t *v, size_t max_tracks)
 {
-    const evs_image_t newest = image_of(v, evs_keyframes_plane(&v->keyframes));
+    const size_t height_px = v->cfg.keyframes.pinhole.height_px;
+    return evs_corners_scan(&v->corners, (max_tracks < height_px) ? max_tracks * ROWS_PER_TRACK : height_px);
+}
+
+/* The corners of the newest image, and for each where it was in the older one if the flow has stayed what it was. */
+static void take_corners(evs_velocity_t *v)
+{
     evs_corner_t *const corners = (void *)v->work;
     const int32_t back_us = -(int32_t)v->pair.interval_us;
-    v->n_tracks = evs_corners_find(&v->corners, &newest, corners, v->n_tracks_max);
+    v->n_tracks = evs_corners_take(&v->corners, corners, v->n_tracks_max);
     v->n_tracked = 0u;
     v->pair.n_corners = (uint16_t)v->n_tracks;
     for (size_t i = 0u; i < v->n_tracks; i++) {
@@ -501,10 +510,10 @@ bool evs_velocity_step(evs_velocity_t *v, size_t max_tracks, evs_velocity_result
     EVS_ASSERT((v != NULL) && (result != NULL) && (max_tracks >= 1u));
     switch (v->stage) {
     case STAGE_CORNERS:
-        find_corners(v);
-        v->stage = STAGE_PYRAMIDS;
+        if (scan_some(v, max_tracks)) { v->stage = STAGE_PYRAMIDS; }
         return false;
     case STAGE_PYRAMIDS:
+        take_corners(v); /* their memory is wanted now */
         build_pyramids(v);
         v->stage = STAGE_TRACKS;
         return false;

@@ -274,6 +274,29 @@ static void test_fewer_are_the_best_ones_and_of_equals_the_first(void)
     TEST_ASSERT_EQUAL_MEMORY(want, found, 4u * sizeof want[0]);
 }
 
+static void test_pieces_of_any_size_find_the_same(void)
+{
+    static const uint16_t SIZES[][2] = {{W, H}, {7u, 7u}, {6u, 40u}, {40u, 1u}};
+    static const size_t PIECES[] = {1u, 2u, 7u, 1000u};
+    for (size_t size = 0u; size < 4u; size++) {
+        const evs_corners_config_t cfg = evs_corners_config_default(SIZES[size][0], SIZES[size][1]);
+        for (int i = 0; i < SIZES[size][0] * SIZES[size][1]; i++) { px[i] = (uint8_t)next_random(256u); }
+        const size_t n_want = find(&cfg, N_CELLS);
+        memcpy(want, found, sizeof want);
+        for (size_t piece = 0u; piece < 4u; piece++) {
+            const evs_image_t image = image_of(cfg.width_px, cfg.height_px);
+            init(&cfg);
+            evs_corners_begin(&corners, &image);
+            size_t n_pieces = 1u;
+            while (!evs_corners_scan(&corners, PIECES[piece])) { n_pieces++; }
+            if (size == 0u) { TEST_ASSERT_EQUAL_UINT((H - 2u + PIECES[piece] - 1u) / PIECES[piece], n_pieces); }
+            TEST_ASSERT_TRUE(evs_corners_scan(&corners, 5u)); /* and nothing more */
+            TEST_ASSERT_EQUAL_UINT(n_want, evs_corners_take(&corners, found, N_CELLS));
+            if (n_want > 0u) { TEST_ASSERT_EQUAL_MEMORY(want, found, n_want * sizeof want[0]); }
+        }
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -282,6 +305,7 @@ int main(void)
     RUN_TEST(test_corners_of_a_square_are_found_and_its_edges_are_not);
     RUN_TEST(test_images_without_corners_have_none);
     RUN_TEST(test_the_hardest_contrast_stays_exact);
+    RUN_TEST(test_pieces_of_any_size_find_the_same);
     RUN_TEST(test_fewer_are_the_best_ones_and_of_equals_the_first);
     return UNITY_END();
 }

@@ -9,8 +9,10 @@
  *          its best pixel (of equals the first, row by row), unless the score is 0 or below min_permille of the
  *          image's highest. Pixels closer than EVS_CORNERS_MARGIN_PX to the border have no score: their block is not whole.
  * Memory   one evs_corners_t and EVS_CORNERS_BYTES() of caller memory: a few rows and one entry per cell, needed only
- *          during evs_corners_find(), so it may be shared with other work.
- * Cost     one pass over the image; a root only where a cell has a new best. docs/performance.md counts it.
+ *          during evs_corners_find(), or from evs_corners_begin() to evs_corners_take(), so it may be shared with other
+ *          work.
+ * Cost     one pass over the image; a root only where a cell has a new best. docs/performance.md counts it. In pieces the
+ *          same, and some 30 instructions per piece.
  * Numeric  integers only, bit-exact on every target. No score or order is rounded: comparisons are by exact products.
  * Threads  no shared state; one context must not be entered from two threads or ISRs at once.
  *
@@ -54,6 +56,10 @@ typedef struct { /** Context. A complete type only so that you can place it: eve
     evs_corners_config_t cfg;
     uint16_t n_columns; /* of cells */
     uint16_t n_rows;
+    uint16_t y_next; /* the row that is looked at next */
+    uint32_t highest;
+    uint32_t floor; /* scores up to this are too low */
+    evs_image_t image;
     void *memory;
 } evs_corners_t;
 
@@ -77,6 +83,15 @@ EVS_NODISCARD evs_status_t evs_corners_init(evs_corners_t *corners, const evs_co
  * @return how many: at most max and at most the number of cells. 0 for an image without a corner, or smaller than 7 x 7 px.
  */
 size_t evs_corners_find(evs_corners_t *corners, const evs_image_t *image, evs_corner_t *out, size_t max);
+
+/** The same in pieces, for a loop that has other things to do: begin, scan until there is nothing left, take. */
+void evs_corners_begin(evs_corners_t *corners, const evs_image_t *image);
+
+/** Look at up to @p n_rows rows more. The image must be unchanged. @return true when all have been looked at. */
+bool evs_corners_scan(evs_corners_t *corners, size_t n_rows);
+
+/** The corners, as evs_corners_find() returns them, after evs_corners_scan() has returned true. */
+size_t evs_corners_take(const evs_corners_t *corners, evs_corner_t *out, size_t max);
 
 #ifdef __cplusplus
 }

@@ -202,7 +202,8 @@ EVS_NODISCARD evs_status_t evs_velocity_begin(evs_velocity_t *v, const evs_veloc
 static inline bool evs_velocity_busy(const evs_velocity_t *v) { return v->stage != 0u; }
 
 /**
- * One bounded piece of the work: finding the corners, or at most @p max_tracks (at least 1) tracks, or the solution.
+ * One bounded piece of the work: at most @p max_tracks (at least 1) tracks, or as much of the search for corners as takes
+ * that long; or the pyramids; or the solution.
  * @return true when the result is there; only then is it written. False with nothing to do.
  */
 bool evs_velocity_step(evs_velocity_t *v, size_t max_tracks, evs_velocity_result_t *result);
