@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 # SPDX-FileCopyrightText: 2026 the evstab authors
-"""Compare the attitude filter with others on the same recordings in one run; write docs/accuracy.md.
+"""Compare the attitude filter with others on the same recordings in one run; write a section of docs/accuracy.md.
 
 usage: compare_attitude.py ATTITUDE_RUN [--data DIR] [--write]
 
@@ -23,6 +23,7 @@ import vqf
 ROOT = os.path.normpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
 sys.path.insert(0, os.path.join(ROOT, "tests", "support"))
 import attitude_score as at  # noqa: E402
+import cross_tree  # noqa: E402
 
 G = 9.80665
 REPEAT = 11
@@ -138,7 +139,7 @@ def main():
     parser = argparse.ArgumentParser(description="Compare attitude filters on the same recordings.")
     parser.add_argument("program")
     parser.add_argument("--data", default=os.environ.get("EVS_DATA_DIR", ""))
-    parser.add_argument("--write", action="store_true", help="write docs/accuracy.md")
+    parser.add_argument("--write", action="store_true", help="write the section of docs/accuracy.md")
     args = parser.parse_args()
     trials = at.load_broad(args.data)
     if not trials:
@@ -155,9 +156,7 @@ def main():
     ]
     commit = subprocess.run(["git", "-C", ROOT, "rev-parse", "--short", "HEAD"], capture_output=True, text=True,
                             check=False).stdout.strip()
-    page = f"""# Accuracy of the attitude
-
-Written by a command; everything on this page was measured in one run, at commit {commit} on {machine()}:
+    section = f"""Written by a command; everything in this section was measured in one run, at commit {commit} on {machine()}:
 
     cmake --preset release && cmake --build --preset release
     python3 tests/bench/compare_attitude.py build/release/tests/bench/attitude_run --data $EVS_DATA_DIR --write
@@ -173,18 +172,20 @@ definitions. `ctest --preset release -R golden.attitude` holds the filter to the
 A filter that normalizes each acceleration before it uses it (imufusion, Valenti) loses the mean of an oscillating one, and
 with it the horizon; see [modules/attitude.md](modules/attitude.md).
 
-## Robustness
+### Robustness
 9D. A spoilt sample itself is not scored, what it leaves behind is. VQF takes no time stamps, so lost samples cost it their motion.
 
 {robustness(trials, args.program)}
-## Speed on this machine
+### Speed on this machine
 {speed(trials[0], args.program)}
 On a Cortex-M4F the update takes the instructions that [performance.md](performance.md) lists.
 """
-    print(page)
+    print(section)
     if args.write:
-        with open(os.path.join(ROOT, "docs", "accuracy.md"), "w", encoding="utf-8") as f:
-            f.write(page)
+        page = os.path.join(ROOT, "docs", "accuracy.md")
+        content = cross_tree.replace_section(page, "attitude", section)
+        with open(page, "w", encoding="utf-8") as f:
+            f.write(content)
     return 0
 
 

@@ -30,9 +30,12 @@ except ImportError as error:
 
 import replay_model as model
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "support"))
+import velocity_score as score
+from velocity_score import Errors, Truth, angle
+
 DATA = pathlib.Path(os.environ.get("EVS_DATA_DIR", "."))
 FAULTS = []
-SLOW = 0.25  # of the mean speed: below it a direction means little
 
 
 def check(what, ok, detail):
@@ -48,57 +51,18 @@ def need(*paths):
             sys.exit(77)
 
 
-class Run:
-    """A replay and what it wrote."""
-
-    def __init__(self, evstab, out, *arguments):
-        done = subprocess.run([evstab, "replay", "--no-report", "-o", str(out), *map(str, arguments)], text=True,
-                              capture_output=True)
-        self.notes = done.stderr
-        if done.returncode != 0:
-            print(done.stderr, end="")
-            print(f"FAIL evstab replay exits {done.returncode}")
-            sys.exit(1)
-        self.summary = json.loads((out / "summary.json").read_text())
-        table = read_rows(out / "velocity.csv", 7)
-        self.t, self.v, self.sigma, self.inliers = table[:, 0], table[:, 1:4], table[:, 4], table[:, 6]
-        check("rows in order, unit vectors", bool((np.diff(self.t) > 0).all()) and
-              bool(np.allclose(np.linalg.norm(self.v, axis=1), 1, atol=1e-6)), f"{len(self.t)} rows")
-        check("as many as the summary says", len(self.t) == self.summary["velocity"]["valid"], self.summary["velocity"])
-
-
-def read_rows(path, n_columns):
-    lines = [line for line in path.read_text().splitlines() if line and line[0] != "#"]
-    return np.array([[float(field) for field in line.split(",")[:n_columns]] for line in lines]).reshape(-1, n_columns)
-
-
-def angle(a, b):
-    cosine = (a * b).sum(axis=1) / (np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1))
-    return np.degrees(np.arccos(np.clip(cosine, -1, 1)))
-
-
-class Errors:
-    """Against a table of true velocities in the camera's frame."""
-
-    def __init__(self, run, truth, only=None):
-        true = np.stack([np.interp(run.t, truth[:, 0], truth[:, k]) for k in (1, 2, 3)], axis=1)
-        speed = np.linalg.norm(true, axis=1)
-        self.kept = (speed >= SLOW * speed.mean()) & (run.t >= truth[0, 0]) & (run.t <= truth[-1, 0])
-        if only is not None:
-            self.kept &= np.isin(np.round(run.t * 1e6), np.round(only * 1e6))
-        self.all = angle(run.v, true)
-        self.deg = self.all[self.kept]
-        self.mean, self.median = float(self.deg.mean()), float(np.median(self.deg))
-
-    def text(self):
-        return (f"mean {self.mean:.2f}, median {self.median:.2f}, 95 % {np.percentile(self.deg, 95):.2f}, "
-                f"max {self.deg.max():.2f} deg of {len(self.deg)}")
+def replay(evstab, out, *arguments):
+    run, _ = score.replay(evstab, out, *arguments)
+    check("rows in order, unit vectors", bool((np.diff(run.t) > 0).all()) and
+          bool(np.allclose(np.linalg.norm(run.v, axis=1), 1, atol=1e-6)), f"{len(run.t)} rows")
+    check("as many as the summary says", len(run.t) == run.summary["velocity"]["valid"], run.summary["velocity"])
+    return run
 
 
 def flight(name):
     folder = DATA / "sim" / name
     need(folder / "events.txt", folder / "velocity.txt", folder / "groundtruth.txt", folder / "imu.txt")
-    return folder, model.read_table(folder / "velocity.txt")
+    return folder, Truth(folder / "groundtruth.txt", folder / "velocity.txt")
 
 
 FLIGHTS = [("sim1_21", 2.5), ("sim3_23", 4.5)]
@@ -107,7 +71,7 @@ FLIGHTS = [("sim1_21", 2.5), ("sim3_23", 4.5)]
 def test_truth(evstab, temp):
     for name, bound in FLIGHTS:
         folder, truth = flight(name)
-        run = Run(evstab, temp / name, folder, "--attitude", "truth")
+        run = replay(evstab, temp / name, folder, "--attitude", "truth")
         errors = Errors(run, truth)
         check(f"{name}: mean error", errors.mean <= bound, f"{errors.text()}; at most {bound}")
         v = run.summary["velocity"]
@@ -115,14 +79,12 @@ def test_truth(evstab, temp):
               f"{run.summary['library_memory_bytes']} bytes")
         check(f"{name}: no direction is turned about", float(errors.deg.max()) < 90, f"{errors.deg.max():.1f} deg at most")
         duration = run.summary["duration_s"]
-        ages = np.diff(np.append(run.t, run.summary["t_last_s"]))
-        covered = float(np.minimum(ages, 0.1).sum()) / duration
+        covered = run.coverage()
         check(f"{name}: an estimate of the last 0.1 s is at hand", covered > 0.8, f"{100 * covered:.1f} % of {duration:.2f} s, "
               f"{len(run.t) / duration:.1f} per s")
-        sigma = run.sigma[errors.kept]
-        within = [float((errors.deg <= k * sigma).mean()) for k in (1, 2)]
+        within = [float((errors.deg <= k * errors.sigma).mean()) for k in (1, 2)]
         check(f"{name}: within 2 sigma", within[1] >= 0.75, f"{100 * within[0]:.0f} % within 1, {100 * within[1]:.0f} % within 2; "
-              f"median sigma {np.median(sigma):.2f} deg")
+              f"median sigma {np.median(errors.sigma):.2f} deg")
 
         # evstab eval tells the same.
         done = subprocess.run([evstab, "eval", str(temp / name), "--truth", str(folder / "groundtruth.txt"), "--velocity-truth",
@@ -142,7 +104,7 @@ def test_order(evstab, temp):
         variants = {"stabilized": (), "full ERL": ("--method", "erl"), "surface": ("--image", "surface"),
                     "window": ("--rotation", "window"), "window, tiled": ("--rotation", "window", "--warp", "tiled"),
                     "as published": ("--method", "erlv-paper")}
-        runs = {key: Run(evstab, temp / f"{name} {key}", folder, "--attitude", "truth", *words)
+        runs = {key: replay(evstab, temp / f"{name} {key}", folder, "--attitude", "truth", *words)
                 for key, words in variants.items()}
         for key, run in runs.items():
             only = None
@@ -170,16 +132,11 @@ def test_order(evstab, temp):
 def test_imu(evstab, temp):
     for name, _ in FLIGHTS:
         folder, truth = flight(name)
-        imu = model.read_table(folder / "imu.txt")
-        rate = np.stack([np.interp(imu[:, 0], truth[:, 0], truth[:, k]) for k in (4, 5, 6)], axis=1)
-        inside = (imu[:, 0] >= truth[0, 0]) & (imu[:, 0] <= truth[-1, 0])
-        bias = (imu[inside, 4:7] - rate[inside]).mean(axis=0)
-        imu[:, 4:7] -= bias
         known = temp / f"{name}_imu.txt"
-        np.savetxt(known, imu, fmt="%.9f")
-        by_truth = Errors(Run(evstab, temp / f"{name} truth", folder, "--attitude", "truth"), truth)
-        by_imu = Errors(Run(evstab, temp / f"{name} imu", folder, "--attitude", "imu", "--imu", known), truth)
-        raw = Errors(Run(evstab, temp / f"{name} raw", folder, "--attitude", "imu"), truth)
+        bias = score.without_bias(folder, known)
+        by_truth = Errors(replay(evstab, temp / f"{name} truth", folder, "--attitude", "truth"), truth)
+        by_imu = Errors(replay(evstab, temp / f"{name} imu", folder, "--attitude", "imu", "--imu", known), truth)
+        raw = Errors(replay(evstab, temp / f"{name} raw", folder, "--attitude", "imu"), truth)
         print(f"     {name}: bias {np.round(bias, 4)} rad/s; not removed: {raw.text()}")
         check(f"{name}: attitude from the IMU", by_imu.mean <= 1.3 * by_truth.mean,
               f"{by_imu.text()}; {by_imu.mean / by_truth.mean:.2f} times that of true attitude")
@@ -188,7 +145,7 @@ def test_imu(evstab, temp):
 def test_slider(evstab, temp):
     folder = DATA / "ecd" / "slider_depth"
     need(folder / "events.txt", folder / "calib.txt")
-    run = Run(evstab, temp / "out", folder)
+    run = replay(evstab, temp / "out", folder)
     errors = angle(run.v, np.array([[1.0, 0.0, 0.0]]))
     check("slider_depth: median angle to +x", float(np.median(errors)) <= 6.0,
           f"median {np.median(errors):.2f}, mean {errors.mean():.2f}, 95 % {np.percentile(errors, 95):.2f}, max {errors.max():.2f} "
@@ -197,7 +154,7 @@ def test_slider(evstab, temp):
     print(f"     {run.summary['velocity']}")
 
 
-class Truth:
+class Poses:
     """Recorded poses, whose clock may run ahead of the events' by a few ms."""
 
     def __init__(self, path):
@@ -230,10 +187,10 @@ def test_windows(evstab, temp):
     focal = model.read_table(calib)[0][0]
     for name, events, words, clock_ms in WINDOWS:
         poses = DATA / "ecd" / name / "groundtruth.txt"
-        truth = Truth(poses)
+        truth = Poses(poses)
         found = {}
         for offset_ms in range(-clock_ms, clock_ms + 1, 5):
-            run = Run(evstab, temp / f"{name} {offset_ms}", DATA / "ecd" / name / events, "--calib", calib, "--poses", poses,
+            run = replay(evstab, temp / f"{name} {offset_ms}", DATA / "ecd" / name / events, "--calib", calib, "--poses", poses,
                       "--attitude", "truth", "--imu-offset-us", offset_ms * 1000, *words)
             pairs = [row.split(",") for row in (temp / f"{name} {offset_ms}" / "pairs.csv").read_text().splitlines()[1:]]
             if len(run.t) == 0:
