@@ -48,17 +48,15 @@ evs_corners_config_t evs_corners_config_default(uint16_t width_px, uint16_t heig
     return cfg;
 }
 
-static bool in_range(uint32_t v, uint32_t lo, uint32_t hi) { return (v >= lo) && (v <= hi); }
-
 evs_status_t evs_corners_init(evs_corners_t *corners, const evs_corners_config_t *cfg, void *memory, size_t n_bytes)
 {
     if ((corners == NULL) || (cfg == NULL) || (memory == NULL)) { return EVS_ERR_NULL; }
-    if (!in_range(cfg->width_px, 1u, EVS_SENSOR_MAX_PX) || !in_range(cfg->height_px, 1u, EVS_SENSOR_MAX_PX) ||
-        !in_range(cfg->cell_px, EVS_CORNERS_CELL_MIN_PX, EVS_CORNERS_CELL_MAX_PX) || (cfg->min_permille > 1000u) ||
-        (((uintptr_t)memory & 3u) != 0u)) {
+    if (!evs_in_range(cfg->width_px, 1u, EVS_SENSOR_MAX_PX) || !evs_in_range(cfg->height_px, 1u, EVS_SENSOR_MAX_PX) ||
+        !evs_in_range(cfg->cell_px, EVS_CORNERS_CELL_MIN_PX, EVS_CORNERS_CELL_MAX_PX) || (cfg->min_permille > 1000u)) {
         return EVS_ERR_ARG;
     }
-    if (n_bytes < EVS_CORNERS_BYTES(cfg->width_px, cfg->height_px, cfg->cell_px)) { return EVS_ERR_SIZE; }
+    const size_t needed = EVS_CORNERS_BYTES(cfg->width_px, cfg->height_px, cfg->cell_px);
+    if ((n_bytes < needed) || (((uintptr_t)memory & 3u) != 0u)) { return EVS_ERR_SIZE; }
 
     const uint32_t cell_px = cfg->cell_px;
     *corners = (evs_corners_t){.cfg = *cfg,

@@ -8,16 +8,14 @@
 
 /* --- pyramid ---------------------------------------------------------------------------------------------------- */
 
-static bool in_range(uint32_t v, uint32_t lo, uint32_t hi) { return (v >= lo) && (v <= hi); }
-
 evs_status_t evs_pyramid_build(evs_pyramid_t *pyramid, const evs_image_t *image, uint16_t n_levels, uint8_t *memory,
                                size_t n_bytes)
 {
     if ((pyramid == NULL) || (image == NULL) || (image->px == NULL) || ((memory == NULL) && (n_levels > 1u))) {
         return EVS_ERR_NULL;
     }
-    if (!in_range(n_levels, 1u, EVS_FLOW_LEVELS_MAX) || !in_range(image->width_px, 1u, EVS_SENSOR_MAX_PX) ||
-        !in_range(image->height_px, 1u, EVS_SENSOR_MAX_PX)) {
+    if (!evs_in_range(n_levels, 1u, EVS_FLOW_LEVELS_MAX) || !evs_in_range(image->width_px, 1u, EVS_SENSOR_MAX_PX) ||
+        !evs_in_range(image->height_px, 1u, EVS_SENSOR_MAX_PX)) {
         return EVS_ERR_ARG;
     }
     if (n_bytes < EVS_PYRAMID_BYTES(image->width_px, image->height_px, n_levels)) { return EVS_ERR_SIZE; }
@@ -54,12 +52,12 @@ evs_status_t evs_flow_init(evs_flow_t *flow, const evs_flow_config_t *cfg, void 
     if ((flow == NULL) || (cfg == NULL) || (memory == NULL)) { return EVS_ERR_NULL; }
     const uint32_t window = cfg->window_px;
     const uint32_t stride = cfg->stride_px;
-    if (!in_range(window, EVS_FLOW_WINDOW_MIN_PX, EVS_FLOW_WINDOW_MAX_PX) || (window % 2u == 0u) ||
-        !in_range(stride, 1u, 2u) || !in_range(cfg->n_iterations, 1u, EVS_FLOW_ITERATIONS_MAX) ||
-        (cfg->epsilon_q8 > 256u) || (cfg->min_eigen_q8 == 0u) || (((uintptr_t)memory & 3u) != 0u)) {
+    if (!evs_in_range(window, EVS_FLOW_WINDOW_MIN_PX, EVS_FLOW_WINDOW_MAX_PX) || (window % 2u == 0u) ||
+        !evs_in_range(stride, 1u, 2u) || !evs_in_range(cfg->n_iterations, 1u, EVS_FLOW_ITERATIONS_MAX) ||
+        (cfg->epsilon_q8 > 256u) || (cfg->min_eigen_q8 == 0u)) {
         return EVS_ERR_ARG;
     }
-    if (n_bytes < EVS_FLOW_BYTES(window, stride)) { return EVS_ERR_SIZE; }
+    if ((n_bytes < EVS_FLOW_BYTES(window, stride)) || (((uintptr_t)memory & 3u) != 0u)) { return EVS_ERR_SIZE; }
 
     const size_t n = EVS_FLOW_SIDE(window, stride) * EVS_FLOW_PITCH(window, stride);
     int16_t *const samples = memory;

@@ -16,17 +16,15 @@
 #define W_COEF_MAX    INT64_C(0x40000000) /* Q35: 64 in Q23 at 2048 px */
 #define W0_MAX_Q23    INT64_C(0x20000000) /* 64 */
 
-static bool in_range(int32_t x, int32_t lo, int32_t hi) { return (x >= lo) && (x <= hi); }
-
 evs_status_t evs_pinhole_check(const evs_pinhole_t *k)
 {
     if (k == NULL) { return EVS_ERR_NULL; }
     const bool ok = (k->width_px >= 1u) && (k->width_px <= EVS_SENSOR_MAX_PX) && (k->height_px >= 1u) &&
                     (k->height_px <= EVS_SENSOR_MAX_PX) &&
-                    in_range(k->fx_q16, EVS_PINHOLE_FOCAL_MIN_Q16, EVS_PINHOLE_FOCAL_MAX_Q16) &&
-                    in_range(k->fy_q16, EVS_PINHOLE_FOCAL_MIN_Q16, EVS_PINHOLE_FOCAL_MAX_Q16) &&
-                    in_range(k->cx_q16, -EVS_PINHOLE_CENTRE_MAX_Q16, EVS_PINHOLE_CENTRE_MAX_Q16) &&
-                    in_range(k->cy_q16, -EVS_PINHOLE_CENTRE_MAX_Q16, EVS_PINHOLE_CENTRE_MAX_Q16) &&
+                    evs_in_range(k->fx_q16, EVS_PINHOLE_FOCAL_MIN_Q16, EVS_PINHOLE_FOCAL_MAX_Q16) &&
+                    evs_in_range(k->fy_q16, EVS_PINHOLE_FOCAL_MIN_Q16, EVS_PINHOLE_FOCAL_MAX_Q16) &&
+                    evs_in_range(k->cx_q16, -EVS_PINHOLE_CENTRE_MAX_Q16, EVS_PINHOLE_CENTRE_MAX_Q16) &&
+                    evs_in_range(k->cy_q16, -EVS_PINHOLE_CENTRE_MAX_Q16, EVS_PINHOLE_CENTRE_MAX_Q16) &&
                     (k->fx_q16 / 2 < k->fy_q16) && (k->fy_q16 / 2 < k->fx_q16);
     return ok ? EVS_OK : EVS_ERR_ARG;
 }

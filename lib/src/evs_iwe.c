@@ -44,8 +44,9 @@ static size_t votes_bytes(const evs_iwe_config_t *cfg)
 evs_status_t evs_iwe_init(evs_iwe_t *iwe, const evs_iwe_config_t *cfg, void *memory, size_t n_bytes)
 {
     if ((iwe == NULL) || (cfg == NULL) || (memory == NULL)) { return EVS_ERR_NULL; }
-    if (!config_ok(cfg) || (((uintptr_t)memory % sizeof(uint32_t)) != 0u)) { return EVS_ERR_ARG; }
-    if (n_bytes < EVS_IWE_BYTES(cfg->width_px, cfg->height_px, cfg->vote)) { return EVS_ERR_SIZE; }
+    if (!config_ok(cfg)) { return EVS_ERR_ARG; }
+    const size_t needed = EVS_IWE_BYTES(cfg->width_px, cfg->height_px, cfg->vote);
+    if ((n_bytes < needed) || (((uintptr_t)memory & 3u) != 0u)) { return EVS_ERR_SIZE; }
 
     *iwe =
         (evs_iwe_t){.cfg = *cfg, .votes = memory, .rows = (uint32_t *)(void *)((uint8_t *)memory + votes_bytes(cfg))};

@@ -53,8 +53,9 @@ static bool config_ok(const evs_surface_config_t *cfg)
 evs_status_t evs_surface_init(evs_surface_t *surface, const evs_surface_config_t *cfg, void *memory, size_t n_bytes)
 {
     if ((surface == NULL) || (cfg == NULL) || (memory == NULL)) { return EVS_ERR_NULL; }
-    if (!config_ok(cfg) || (((uintptr_t)memory % sizeof(uint16_t)) != 0u)) { return EVS_ERR_ARG; }
-    if (n_bytes < EVS_SURFACE_BYTES(cfg->width_px, cfg->height_px)) { return EVS_ERR_SIZE; }
+    if (!config_ok(cfg)) { return EVS_ERR_ARG; }
+    const size_t needed = EVS_SURFACE_BYTES(cfg->width_px, cfg->height_px);
+    if ((n_bytes < needed) || (((uintptr_t)memory & 1u) != 0u)) { return EVS_ERR_SIZE; }
 
     *surface = (evs_surface_t){.cfg = *cfg, .stamps = memory, .tau_us = cfg->tau_start_us};
     return EVS_OK;

@@ -91,17 +91,16 @@ size_t evs_warp_bytes(const evs_warp_config_t *cfg)
     return EVS_WARP_BYTES(cfg->width_px, cfg->height_px, cfg->n_budget, cfg->max_px, cfg->shift);
 }
 
-static bool in_range(uint32_t v, uint32_t lo, uint32_t hi) { return (v >= lo) && (v <= hi); }
-
 static bool config_ok(const evs_warp_config_t *cfg)
 {
     evs_flow_grid_t grid;
     return ((cfg->kind == EVS_WARP_PREDICTED) || (cfg->kind == EVS_WARP_GLOBAL) || (cfg->kind == EVS_WARP_TILED)) &&
            ((cfg->cost == EVS_WARP_MEAN_SQUARE) || (cfg->cost == EVS_WARP_GRADIENT)) &&
-           in_range(cfg->width_px, 16u, EVS_SENSOR_MAX_PX) && in_range(cfg->height_px, 16u, EVS_SENSOR_MAX_PX) &&
+           evs_in_range(cfg->width_px, 16u, EVS_SENSOR_MAX_PX) &&
+           evs_in_range(cfg->height_px, 16u, EVS_SENSOR_MAX_PX) &&
            (evs_flow_grid_init(&grid, cfg->width_px, cfg->height_px, cfg->n_cols, cfg->n_rows) == EVS_OK) &&
-           in_range(cfg->n_budget, 1u, EVS_WARP_BUDGET_MAX) && (cfg->n_min >= 2u) &&
-           in_range(cfg->max_px, 2u, EVS_WARP_MAX_PX) && in_range(cfg->shift, 1u, EVS_WARP_SHIFT_MAX) &&
+           evs_in_range(cfg->n_budget, 1u, EVS_WARP_BUDGET_MAX) && (cfg->n_min >= 2u) &&
+           evs_in_range(cfg->max_px, 2u, EVS_WARP_MAX_PX) && evs_in_range(cfg->shift, 1u, EVS_WARP_SHIFT_MAX) &&
            (cfg->noise_percent <= EVS_WARP_NOISE_MAX_PERCENT);
 }
 
@@ -111,7 +110,7 @@ evs_status_t evs_warp_init(evs_warp_t *warp, const evs_warp_config_t *cfg, void 
     if (!config_ok(cfg)) { return EVS_ERR_ARG; }
     const size_t needed = evs_warp_bytes(cfg);
     if ((memory == NULL) && (needed > 0u)) { return EVS_ERR_NULL; }
-    if (n_bytes < needed) { return EVS_ERR_SIZE; }
+    if ((n_bytes < needed) || (((uintptr_t)memory & 1u) != 0u)) { return EVS_ERR_SIZE; }
 
     *warp = (evs_warp_t){.cfg = *cfg};
     if (needed > 0u) {

@@ -159,7 +159,7 @@ static void test_init_names_the_fault_and_leaves_the_context_alone(void)
     }
     const size_t n_bytes = EVS_CORNERS_BYTES(W, H, 16u);
     uint8_t *const odd = (uint8_t *)memory + 2;
-    TEST_ASSERT_EQUAL_INT(EVS_ERR_ARG, evs_corners_init(&corners, &good, odd, n_bytes));
+    TEST_ASSERT_EQUAL_INT(EVS_ERR_SIZE, evs_corners_init(&corners, &good, odd, n_bytes));
     TEST_ASSERT_EQUAL_INT(EVS_ERR_SIZE, evs_corners_init(&corners, &good, memory, n_bytes - 1u));
     TEST_ASSERT_EQUAL_INT(EVS_ERR_NULL, evs_corners_init(NULL, &good, memory, n_bytes));
     TEST_ASSERT_EQUAL_INT(EVS_ERR_NULL, evs_corners_init(&corners, NULL, memory, n_bytes));

@@ -38,6 +38,9 @@ static void test_saturation_keeps_what_fits_and_clips_the_rest(void)
     TEST_ASSERT_EQUAL_INT32(3, evs_clamp(9, -3, 3));
     TEST_ASSERT_EQUAL_INT32(-3, evs_clamp(-9, -3, 3));
     TEST_ASSERT_EQUAL_INT32(1, evs_clamp(1, -3, 3));
+    TEST_ASSERT_TRUE(evs_in_range(-3, -3, 3) && evs_in_range(3, -3, 3));
+    TEST_ASSERT_FALSE(evs_in_range(-4, -3, 3) || evs_in_range(4, -3, 3));
+    TEST_ASSERT_FALSE(evs_in_range(UINT32_MAX, -3, 3)); /* not the -1 of its bits */
     TEST_ASSERT_EQUAL_INT32(INT32_MAX, evs_add_sat(INT32_MAX, 1));
     TEST_ASSERT_EQUAL_INT32(INT32_MAX, evs_sub_sat(0, INT32_MIN));
     TEST_ASSERT_EQUAL_UINT32(UINT32_C(0x80000000), evs_abs_u32(INT32_MIN));

@@ -213,7 +213,7 @@ static void test_init_names_the_fault_and_leaves_the_context_alone(void)
     }
     bad[5].n_iterations = EVS_FLOW_ITERATIONS_MAX + 1u;
     TEST_ASSERT_EQUAL_INT(EVS_ERR_ARG, evs_flow_init(&flow, &bad[5], memory, SIZE_MAX));
-    TEST_ASSERT_EQUAL_INT(EVS_ERR_ARG, evs_flow_init(&flow, &good, (uint8_t *)memory + 1, SIZE_MAX));
+    TEST_ASSERT_EQUAL_INT(EVS_ERR_SIZE, evs_flow_init(&flow, &good, (uint8_t *)memory + 1, SIZE_MAX));
     const size_t n_bytes = EVS_FLOW_BYTES(25, 2);
     TEST_ASSERT_EQUAL_INT(EVS_ERR_SIZE, evs_flow_init(&flow, &good, memory, n_bytes - 1u));
     TEST_ASSERT_EQUAL_INT(EVS_ERR_NULL, evs_flow_init(NULL, &good, memory, n_bytes));

@@ -117,7 +117,7 @@ static void test_init_names_the_fault_and_leaves_the_context_alone(void)
     for (size_t i = 0; i < 9u; i++) {
         TEST_ASSERT_EQUAL_INT_MESSAGE(EVS_ERR_ARG, evs_iwe_init(&iwe, &bad[i], &memory, n), "a bad setting");
     }
-    TEST_ASSERT_EQUAL_INT(EVS_ERR_ARG, evs_iwe_init(&iwe, &good, memory.bytes + 2, n));
+    TEST_ASSERT_EQUAL_INT(EVS_ERR_SIZE, evs_iwe_init(&iwe, &good, memory.bytes + 2, n));
     TEST_ASSERT_EQUAL_INT(EVS_ERR_NULL, evs_iwe_init(NULL, &good, &memory, n));
     TEST_ASSERT_EQUAL_INT(EVS_ERR_NULL, evs_iwe_init(&iwe, NULL, &memory, n));
     TEST_ASSERT_EQUAL_INT(EVS_ERR_NULL, evs_iwe_init(&iwe, &good, NULL, n));

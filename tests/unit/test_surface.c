@@ -92,7 +92,7 @@ static void test_init_names_the_fault_and_leaves_the_context_alone(void)
     for (size_t i = 0; i < 12u; i++) {
         TEST_ASSERT_EQUAL_INT_MESSAGE(EVS_ERR_ARG, evs_surface_init(&surface, &bad[i], memory, n), "a bad setting");
     }
-    TEST_ASSERT_EQUAL_INT(EVS_ERR_ARG, evs_surface_init(&surface, &good, (uint8_t *)memory + 1, n));
+    TEST_ASSERT_EQUAL_INT(EVS_ERR_SIZE, evs_surface_init(&surface, &good, (uint8_t *)memory + 1, n));
     TEST_ASSERT_EQUAL_INT(EVS_ERR_NULL, evs_surface_init(NULL, &good, memory, n));
     TEST_ASSERT_EQUAL_INT(EVS_ERR_NULL, evs_surface_init(&surface, NULL, memory, n));
     TEST_ASSERT_EQUAL_INT(EVS_ERR_NULL, evs_surface_init(&surface, &good, NULL, n));

@@ -352,6 +352,7 @@ static void test_init_names_the_fault_and_leaves_the_context_alone(void)
     TEST_ASSERT_EQUAL_INT(EVS_ERR_NULL, evs_warp_init(NULL, &good, memory, sizeof memory));
     TEST_ASSERT_EQUAL_INT(EVS_ERR_NULL, evs_warp_init(&warp, NULL, memory, sizeof memory));
     TEST_ASSERT_EQUAL_INT(EVS_ERR_NULL, evs_warp_init(&warp, &good, NULL, sizeof memory));
+    TEST_ASSERT_EQUAL_INT(EVS_ERR_SIZE, evs_warp_init(&warp, &good, (uint8_t *)memory + 1, sizeof memory));
     TEST_ASSERT_EQUAL_INT(EVS_ERR_SIZE, evs_warp_init(&warp, &good, memory, needed - 1u));
     TEST_ASSERT_EQUAL_INT(EVS_OK, evs_warp_init(&warp, &good, memory, needed));
     good.kind = EVS_WARP_PREDICTED;

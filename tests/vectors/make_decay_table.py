@@ -8,8 +8,9 @@
 
 Decimal arithmetic, so that no platform's exp() decides a rounding.
 """
-import sys
 from decimal import Decimal as D, getcontext
+
+from generated import main
 
 getcontext().prec = 40
 
@@ -28,16 +29,4 @@ def source():
     return "\n".join(lines)
 
 
-def main():
-    if len(sys.argv) == 1:
-        sys.stdout.write(source())
-    elif len(sys.argv) == 3 and sys.argv[1] == "--check":
-        with open(sys.argv[2], encoding="utf-8") as f:
-            if f.read() != source():
-                sys.exit(sys.argv[2] + " is not what make_decay_table.py makes")
-        print("same as generated")
-    else:
-        sys.exit(__doc__)
-
-
-main()
+main(source, __doc__)

@@ -9,8 +9,9 @@
 Row i is for a point (i - 8) / 16 px right of the pixel in the middle. Q15. An eighth column of zeros fills a vector.
 Decimal arithmetic, so that no platform's exp() decides a rounding.
 """
-import sys
 from decimal import Decimal as D, getcontext
+
+from generated import main
 
 getcontext().prec = 40
 PI = D("3.1415926535897932384626433832795028841972")
@@ -34,16 +35,4 @@ def source():
     return "\n".join(lines)
 
 
-def main():
-    if len(sys.argv) == 1:
-        sys.stdout.write(source())
-    elif len(sys.argv) == 3 and sys.argv[1] == "--check":
-        with open(sys.argv[2], encoding="utf-8") as f:
-            if f.read() != source():
-                sys.exit(sys.argv[2] + " is not what make_gauss_table.py makes")
-        print("same as generated")
-    else:
-        sys.exit(__doc__)
-
-
-main()
+main(source, __doc__)

@@ -13,9 +13,10 @@ the value at the edge that its f starts from. The slope is that of the chord, th
 and curve. Worst relative error: 2^-17, at w = 1/2. Exact rational arithmetic but for one square root, which is rounded
 far below the table's last bit.
 """
-import sys
 from fractions import Fraction as F
 from math import isqrt
+
+from generated import main
 
 CELLS, Q = 256, 29
 
@@ -55,16 +56,4 @@ def source():
     return "\n".join(lines)
 
 
-def main():
-    if len(sys.argv) == 1:
-        sys.stdout.write(source())
-    elif len(sys.argv) == 3 and sys.argv[1] == "--check":
-        with open(sys.argv[2], encoding="utf-8") as f:
-            if f.read() != source():
-                sys.exit(sys.argv[2] + " is not what make_recip_table.py makes")
-        print("same as generated")
-    else:
-        sys.exit(__doc__)
-
-
-main()
+main(source, __doc__)

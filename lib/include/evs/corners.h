@@ -71,7 +71,7 @@ evs_corners_config_t evs_corners_config_default(uint16_t width_px, uint16_t heig
  * @param[out] corners  Untouched on error.
  * @param      memory   Kept by reference, aligned to 4; contents do not matter, neither now nor between two calls.
  * @param      n_bytes  At least EVS_CORNERS_BYTES(cfg->width_px, cfg->height_px, cfg->cell_px).
- * @return EVS_OK, EVS_ERR_NULL, EVS_ERR_ARG (a setting is out of range, or the memory is not aligned) or EVS_ERR_SIZE.
+ * @return EVS_OK, EVS_ERR_NULL, EVS_ERR_ARG (a setting is out of range) or EVS_ERR_SIZE (too little memory, or misaligned).
  */
 EVS_NODISCARD evs_status_t evs_corners_init(evs_corners_t *corners, const evs_corners_config_t *cfg, void *memory,
                                             size_t n_bytes);

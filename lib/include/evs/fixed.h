@@ -40,6 +40,9 @@ static inline int16_t evs_sat16(int32_t x)
     return (x < INT16_MIN) ? (int16_t)INT16_MIN : (int16_t)x;
 }
 
+/** Whether x lies in [lo, hi]: for settings. */
+static inline bool evs_in_range(int64_t x, int64_t lo, int64_t hi) { return (x >= lo) && (x <= hi); }
+
 /** x limited to [lo, hi]. */
 static inline int32_t evs_clamp(int32_t x, int32_t lo, int32_t hi) { return (x < lo) ? lo : ((x > hi) ? hi : x); }
 

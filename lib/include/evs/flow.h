@@ -136,7 +136,7 @@ evs_flow_config_t evs_flow_config_default(void);
  * @param[out] flow     Untouched on error.
  * @param      memory   Kept by reference, aligned to 4; contents do not matter, neither now nor between two calls.
  * @param      n_bytes  At least EVS_FLOW_BYTES(cfg->window_px, cfg->stride_px).
- * @return EVS_OK, EVS_ERR_NULL, EVS_ERR_ARG (a setting is out of range, or the memory is not aligned) or EVS_ERR_SIZE.
+ * @return EVS_OK, EVS_ERR_NULL, EVS_ERR_ARG (a setting is out of range) or EVS_ERR_SIZE (too little memory, or misaligned).
  */
 EVS_NODISCARD evs_status_t evs_flow_init(evs_flow_t *flow, const evs_flow_config_t *cfg, void *memory, size_t n_bytes);
 

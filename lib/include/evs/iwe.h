@@ -77,7 +77,7 @@ evs_iwe_config_t evs_iwe_config_default(uint16_t width_px, uint16_t height_px);
  *                      width_px * height_px, row by row: uint8_t counts (NEAREST), uint16_t Q8 (BILINEAR) or Q10 (GAUSSIAN).
  *                      You may read them, and use the memory for something else until the next evs_iwe_clear().
  * @param      n_bytes  At least EVS_IWE_BYTES(width_px, height_px, vote).
- * @return EVS_OK, EVS_ERR_NULL, EVS_ERR_ARG (a setting is out of range or the memory not aligned) or EVS_ERR_SIZE.
+ * @return EVS_OK, EVS_ERR_NULL, EVS_ERR_ARG (a setting is out of range) or EVS_ERR_SIZE (too little memory, or misaligned).
  */
 EVS_NODISCARD evs_status_t evs_iwe_init(evs_iwe_t *iwe, const evs_iwe_config_t *cfg, void *memory, size_t n_bytes);
 

@@ -70,7 +70,7 @@ evs_surface_config_t evs_surface_config_default(uint16_t width_px, uint16_t heig
  * @param[out] surface  Untouched on error.
  * @param      memory   Kept by reference, aligned for uint16_t; contents on entry do not matter.
  * @param      n_bytes  At least EVS_SURFACE_BYTES(width_px, height_px).
- * @return EVS_OK, EVS_ERR_NULL, EVS_ERR_ARG (a setting is out of range or the memory not aligned) or EVS_ERR_SIZE.
+ * @return EVS_OK, EVS_ERR_NULL, EVS_ERR_ARG (a setting is out of range) or EVS_ERR_SIZE (too little memory, or misaligned).
  */
 EVS_NODISCARD evs_status_t evs_surface_init(evs_surface_t *surface, const evs_surface_config_t *cfg, void *memory,
                                             size_t n_bytes);

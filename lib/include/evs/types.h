@@ -26,7 +26,7 @@ typedef enum {
     EVS_OK = 0,
     EVS_ERR_NULL = -1,    /**< A required pointer is NULL. */
     EVS_ERR_ARG = -2,     /**< A setting or an argument is outside its documented range. */
-    EVS_ERR_SIZE = -3,    /**< A buffer of the caller is too small. */
+    EVS_ERR_SIZE = -3,    /**< A buffer of the caller is too small or misaligned. */
     EVS_ERR_TIME = -4,    /**< A time runs back or jumps further than the module allows. */
     EVS_ERR_STATE = -5,   /**< The call does not fit the state, e.g. nothing was pushed yet. */
     EVS_ERR_NUMERIC = -6, /**< No answer exists: no preimage, a zero vector, an overflow. */

@@ -133,7 +133,7 @@ size_t evs_warp_bytes(const evs_warp_config_t *cfg);
  * Bind a context to caller memory.
  * @param[out] warp    Untouched on error.
  * @param      memory  Kept by reference, aligned to 2 bytes; contents on entry do not matter. PREDICTED: may be NULL.
- * @return EVS_OK, EVS_ERR_NULL, EVS_ERR_ARG (a setting is out of range) or EVS_ERR_SIZE.
+ * @return EVS_OK, EVS_ERR_NULL, EVS_ERR_ARG (a setting is out of range) or EVS_ERR_SIZE (too little memory, or misaligned).
  */
 EVS_NODISCARD evs_status_t evs_warp_init(evs_warp_t *warp, const evs_warp_config_t *cfg, void *memory, size_t n_bytes);
 
