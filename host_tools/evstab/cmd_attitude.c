@@ -10,6 +10,7 @@
 #include "csv_writer.h"
 #include "evs/attitude.h"
 #include "faults.h"
+#include "gyro_bias.h"
 #include "imu_feed.h"
 #include "options.h"
 #include "progress.h"
@@ -17,12 +18,16 @@
 
 static const char *opt_out;
 static const char *opt_mode;
+static const char *opt_gyro_bias;
 static bool opt_quiet;
 
 static const evt_option_t OPTIONS[] = {
     {"output", 'o', "Q.csv", "Where the orientations go. Needed.", &opt_out, NULL},
     {"mode", '\0', "MODE",
      "filter (default), gyro (integration alone) or valenti\n(the published complementary filter).", &opt_mode, NULL},
+    {"gyro-bias", '\0', "X,Y,Z",
+     "What the gyro reads at rest about its x, y and z axis, in\nrad/s: subtracted from the start. Default: unknown.",
+     &opt_gyro_bias, NULL},
     {"quiet", 'q', NULL, "No progress, no notes, no closing line.", NULL, &opt_quiet},
 };
 
@@ -78,7 +83,8 @@ static bool run(evh_imu_t *imu, evs_attitude_t *att, evh_csv_t *out, uint64_t *n
     return err->text[0] == '\0';
 }
 
-static bool attitude(const char *in_path, const char *out_path, evs_attitude_mode_t mode, evh_error_t *err)
+static bool attitude(const char *in_path, const char *out_path, evs_attitude_mode_t mode, const evt_gyro_bias_t *bias,
+                     evh_error_t *err)
 {
     evs_attitude_config_t config = evs_attitude_config_default();
     evs_attitude_t att;
@@ -88,7 +94,9 @@ static bool attitude(const char *in_path, const char *out_path, evs_attitude_mod
     bool ok;
 
     config.mode = mode;
+    evt_gyro_bias_admit(bias, &config);
     if (evs_attitude_init(&att, &config) != EVS_OK) { return evh_fail(err, "the filter refuses its own defaults"); }
+    evt_gyro_bias_give(bias, &att);
     if (!evh_imu_open_named(&imu, in_path, err)) { return false; }
     if (!imu.rows.has_ahead) {
         evh_imu_close(&imu);
@@ -124,6 +132,7 @@ int evt_attitude_main(int argc, char **argv)
     static const evs_attitude_mode_t MODE_VALUES[] = {EVS_ATTITUDE_FILTER, EVS_ATTITUDE_GYRO_ONLY,
                                                       EVS_ATTITUDE_VALENTI};
     const char *words[1];
+    evt_gyro_bias_t bias = {.given = false};
     evh_error_t err = {""};
     size_t mode = 0u;
     int status = EVT_EXIT_OK;
@@ -136,8 +145,11 @@ int evt_attitude_main(int argc, char **argv)
             return evt_usage_error(&USAGE, "--mode is '%s'; expected filter, gyro or valenti", opt_mode);
         }
     }
+    if ((opt_gyro_bias != NULL) && !evt_gyro_bias_parse(opt_gyro_bias, &bias)) {
+        return evt_usage_error(&USAGE, "--gyro-bias is '%s'; expected " EVT_GYRO_BIAS_EXPECTED, opt_gyro_bias);
+    }
     evh_set_quiet(opt_quiet);
-    if (!attitude(words[0], opt_out, MODE_VALUES[mode], &err)) {
+    if (!attitude(words[0], opt_out, MODE_VALUES[mode], &bias, &err)) {
         (void)fprintf(stderr, "evstab attitude: %s\n", err.text);
         return EVT_EXIT_FAILED;
     }

@@ -72,12 +72,16 @@ static const evt_option_t OPTIONS[] = {
     {"imu-offset-us", '\0', "N",
      "t_event = t_imu + N, in microseconds; with --attitude truth\nthe same for the poses. Default: 0.",
      &opt.imu_offset, NULL},
+    {"gyro-bias", '\0', "X,Y,Z",
+     "What the gyro reads at rest about its x, y and z axis, in\n"
+     "rad/s: subtracted from the start. Default: unknown, learnt\nat rest.",
+     &opt.gyro_bias, NULL},
     {"poses", '\0', "FILE", "Poses: t px py pz qx qy qz qw, or CSV with a header.", &opt.poses, NULL},
     {"config", '\0', "FILE.yaml",
      "Camera, extrinsics and window with the paper's names:\n"
      "K D fisheye_distortion q_external accumulation_type\n"
      "roi_threshold number_of_columns number_of_rows ...\n"
-     "and ours: image warp velocity method.",
+     "and ours: image warp velocity method gyro_bias.",
      &opt.config, NULL},
     {"size", '\0', "WxH", "Sensor size in pixels. Default: what the YAML file says,\nelse 240x180.", &opt.size, NULL},
     {"paper", '\0', NULL,

@@ -12,6 +12,7 @@
 #include "csv_writer.h"
 #include "event_source.h"
 #include "evs/pipeline.h"
+#include "gyro_bias.h"
 #include "imu_text.h"
 #include "poses_text.h"
 #include "recording.h"
@@ -28,7 +29,7 @@ typedef struct {
     const char *size, *imu_order;
     const char *attitude, *window, *rotation, *saccade;
     const char *image, *warp, *velocity, *method, *baseline;
-    const char *imu_offset, *from, *to, *write, *video;
+    const char *imu_offset, *gyro_bias, *from, *to, *write, *video;
     bool paper, no_report;
 } evt_replay_options_t;
 
@@ -39,6 +40,7 @@ typedef struct {
     evh_calib_t calib;      /**< With the sensor size that counts. */
     evt_attitude_t attitude;
     evh_imu_order_t imu_order;
+    evt_gyro_bias_t gyro_bias;
     evs_pipeline_config_t pipeline;
     int64_t from_us, to_us; /**< Events in [from, to). */
     bool write_events, write_frames;
@@ -87,6 +89,8 @@ typedef struct {
     evh_tally_t events_tally, imu_tally, poses_tally;
     evs_pipeline_counts_t counts;
     evs_attitude_faults_t attitude_faults;
+    bool gyro_bias_known;     /**< In the end: told or learnt at rest. */
+    evs_vec3_t gyro_bias_q24; /**< Of the filter in the end, rad/s. */
 } evt_replay_result_t;
 
 /** The output files of a run. */

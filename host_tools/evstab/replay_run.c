@@ -65,6 +65,7 @@ static bool open_pipeline(run_t *run, evh_error_t *err)
         return evh_fail(err, "the library refuses these settings (%s); check calibration, sensor size and window",
                         evs_status_name(status));
     }
+    evt_gyro_bias_give(&run->r->gyro_bias, evs_pipeline_attitude(&run->pipeline));
     return true;
 }
 
@@ -320,6 +321,9 @@ bool evt_replay_run(const evt_replay_t *r, const char *dir, const evt_replay_wat
         result->counts = evs_pipeline_counts(&run->pipeline);
         if (part != NULL) { result->velocity.library = evs_velocity_counts(part); }
         result->attitude_faults = evs_attitude_faults(evs_pipeline_attitude(&run->pipeline));
+        result->gyro_bias_q24 = evs_attitude_bias(evs_pipeline_attitude(&run->pipeline));
+        result->gyro_bias_known =
+            (evs_attitude_flags(evs_pipeline_attitude(&run->pipeline)) & EVS_ATTITUDE_BIAS_KNOWN) != 0u;
     }
     free(run->inside_us);
     free(run->memory);

@@ -228,6 +228,27 @@ static bool settle_calib(evt_replay_t *r, const evt_replay_options_t *o, const e
     return true;
 }
 
+/* Over what the YAML file says. */
+static bool parse_gyro_bias(const evt_replay_options_t *o, evt_gyro_bias_t *bias, bool *usage_fault, evh_error_t *err)
+{
+    if ((o->gyro_bias == NULL) || evt_gyro_bias_parse(o->gyro_bias, bias)) { return true; }
+    return usage(usage_fault, err, "--gyro-bias", o->gyro_bias, EVT_GYRO_BIAS_EXPECTED);
+}
+
+static bool settle_gyro_bias(evt_replay_t *r, const evt_replay_options_t *o, const evh_config_t *config, bool by_imu,
+                             bool *usage_fault, evh_error_t *err)
+{
+    r->gyro_bias.given = config->has_gyro_bias;
+    memcpy(r->gyro_bias.rad_s, config->gyro_bias_rad_s, sizeof r->gyro_bias.rad_s);
+    if (!parse_gyro_bias(o, &r->gyro_bias, usage_fault, err)) { return false; }
+    if (r->gyro_bias.given && !by_imu) {
+        evh_note("the gyro bias is not used: the attitude is not from the IMU");
+        r->gyro_bias.given = false;
+    }
+    evt_gyro_bias_admit(&r->gyro_bias, &r->pipeline.attitude);
+    return true;
+}
+
 static bool settle_attitude(evt_replay_t *r, const evt_replay_options_t *o, const evh_config_t *config,
                             bool *usage_fault, evh_error_t *err)
 {
@@ -248,7 +269,8 @@ static bool settle_attitude(evt_replay_t *r, const evt_replay_options_t *o, cons
                                      ? "truth (the recorded poses)"
                                      : "none (no IMU and no poses): nothing is rotated");
     }
-    if (((r->attitude == EVT_ATTITUDE_IMU) || (r->attitude == EVT_ATTITUDE_GYRO)) && !has_imu) {
+    const bool by_imu = (r->attitude == EVT_ATTITUDE_IMU) || (r->attitude == EVT_ATTITUDE_GYRO);
+    if (by_imu && !has_imu) {
         return evh_fail(err, "%s: no IMU file; give --imu FILE, or --attitude truth or none", o->input);
     }
     if ((r->attitude == EVT_ATTITUDE_TRUTH) && !has_poses) {
@@ -258,7 +280,7 @@ static bool settle_attitude(evt_replay_t *r, const evt_replay_options_t *o, cons
                          : (r->attitude == EVT_ATTITUDE_TRUTH) ? EVS_PIPELINE_ORIENTATION
                                                                : EVS_PIPELINE_IMU;
     if (r->attitude == EVT_ATTITUDE_GYRO) { r->pipeline.attitude.mode = EVS_ATTITUDE_GYRO_ONLY; }
-    return true;
+    return settle_gyro_bias(r, o, config, by_imu, usage_fault, err);
 }
 
 static bool settle_times(evt_replay_t *r, const evt_replay_options_t *o, bool *usage_fault, evh_error_t *err)
@@ -408,8 +430,8 @@ static bool check_words(const evt_replay_options_t *o, bool *usage_fault, evh_er
     if ((o->saccade != NULL) && !evt_parse_on_off(o->saccade, &on)) {
         return usage(usage_fault, err, "--saccade", o->saccade, "on or off");
     }
-    return settle_times(&dummy, o, usage_fault, err) && settle_write(&dummy, o, usage_fault, err) &&
-           evt_imaging_check_words(o, usage_fault, err);
+    return settle_times(&dummy, o, usage_fault, err) && parse_gyro_bias(o, &dummy.gyro_bias, usage_fault, err) &&
+           settle_write(&dummy, o, usage_fault, err) && evt_imaging_check_words(o, usage_fault, err);
 }
 
 bool evt_replay_settle(evt_replay_t *r, const evt_replay_options_t *options, bool *usage_fault, evh_error_t *err)

@@ -102,6 +102,9 @@ static void add_settings(cJSON *root, const evt_replay_t *r, const evt_replay_op
     add_imaging(s, p);
     (void)cJSON_AddBoolToObject(s, "paper", o->paper);
     (void)cJSON_AddNumberToObject(s, "imu_offset_us", p->track.offset_us);
+    if (r->gyro_bias.given) {
+        (void)cJSON_AddItemToObject(s, "gyro_bias_rad_s", cJSON_CreateDoubleArray(r->gyro_bias.rad_s, 3));
+    }
     (void)cJSON_AddNumberToObject(s, "table_step_px", p->table_step_px);
     q_ci = cJSON_AddArrayToObject(s, "q_camera_from_imu_wxyz");
     for (int i = 0; i < 4; i++) { (void)cJSON_AddItemToArray(q_ci, cJSON_CreateNumber(evs_q_to_double(q[i], 30u))); }
@@ -132,6 +135,9 @@ static void add_attitude(cJSON *root, const evt_replay_t *r, const evt_replay_re
 {
     cJSON *const a = cJSON_AddObjectToObject(root, "attitude");
     const evs_attitude_faults_t *const f = &x->attitude_faults;
+    const int32_t q24[3] = {x->gyro_bias_q24.x, x->gyro_bias_q24.y, x->gyro_bias_q24.z};
+    cJSON *bias;
+    char text[24];
     evt_json_count(a, "samples", x->n_orientations);
     if (x->n_orientations > 0u) {
         evt_json_seconds(a, "t_first_s", x->orientation_first_us);
@@ -144,6 +150,12 @@ static void add_attitude(cJSON *root, const evt_replay_t *r, const evt_replay_re
         evt_json_count(a, "gyro_gaps", f->n_gyro_gaps);
         evt_json_count(a, "accel_left_out", f->n_accel_bad);
         evt_json_count(a, "mag_left_out", f->n_mag_bad);
+        (void)cJSON_AddBoolToObject(a, "gyro_bias_known", x->gyro_bias_known);
+        bias = cJSON_AddArrayToObject(a, "gyro_bias_rad_s");
+        for (int i = 0; i < 3; i++) {
+            (void)snprintf(text, sizeof text, "%.6f", evs_q_to_double(q24[i], 24u));
+            (void)cJSON_AddItemToArray(bias, cJSON_CreateRaw(text));
+        }
     } else if (r->attitude == EVT_ATTITUDE_TRUTH) {
         add_faults(a, "bad", &x->poses_tally);
     }

@@ -146,6 +146,21 @@ static bool set_q_external(parser_t *p, const yaml_node_t *node)
     return true;
 }
 
+static bool set_gyro_bias(parser_t *p, const yaml_node_t *node)
+{
+    double *const bias = p->config->gyro_bias_rad_s;
+    size_t n = 0u;
+    if (!take_list(p, node, "gyro_bias", 3u, bias, 3u, &n)) { return false; }
+    for (size_t i = 0u; i < n; i++) {
+        if (!(fabs(bias[i]) <= EVH_GYRO_BIAS_MAX_RAD_S)) {
+            return evh_fail(p->err, "%s: line %lu: gyro_bias has %g; expected rad/s within %g", p->name, line_of(node),
+                            bias[i], EVH_GYRO_BIAS_MAX_RAD_S);
+        }
+    }
+    p->config->has_gyro_bias = true;
+    return true;
+}
+
 /* One of the words, which are listed as the message shall list them: "iwe, surface, count". */
 static bool set_word(parser_t *p, const yaml_node_t *node, const char *key, const char *words,
                      char out[EVH_CONFIG_WORD_MAX])
@@ -272,6 +287,7 @@ static bool take_key(parser_t *p, const char *key, const yaml_node_t *value, boo
         return take_list(p, value, key, 16u, p->t_bs, 16u, &n);
     }
     if (strcmp(key, "q_external") == 0) { return set_q_external(p, value); }
+    if (strcmp(key, "gyro_bias") == 0) { return set_gyro_bias(p, value); }
     if (strcmp(key, "use_external_extrinsic_rotation") == 0) {
         if (!take_bool(p, value, key, &flag)) { return false; }
         p->external_off = !flag;

@@ -21,6 +21,8 @@ typedef enum {
     EVH_WINDOW_TIME   /**< accumulation_type: time */
 } evh_window_kind_t;
 
+#define EVH_GYRO_BIAS_MAX_RAD_S 0.5
+
 /** Room for a word with its end. */
 #define EVH_CONFIG_WORD_MAX 24
 
@@ -48,6 +50,8 @@ typedef struct {
     char warp[EVH_CONFIG_WORD_MAX];
     char method[EVH_CONFIG_WORD_MAX];
     bool has_velocity, velocity;
+    bool has_gyro_bias; /**< gyro_bias: rad/s, in the IMU's axes. */
+    double gyro_bias_rad_s[3];
     bool has_from_imu, from_imu; /**< get_orientation_from_imu */
 } evh_config_t;
 

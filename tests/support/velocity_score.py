@@ -117,12 +117,14 @@ def replay(evstab, out, *arguments):
     return Result(out), done.stderr
 
 
-def without_bias(folder, path):
-    """Write the samples of a simulated flight's imu.txt less the mean error of their rates; returns that bias."""
+def gyro_bias(folder):
+    """The mean error of the rates in a simulated flight's imu.txt."""
     imu, true = read_table(folder / "imu.txt"), read_table(folder / "velocity.txt")
     rate = np.stack([np.interp(imu[:, 0], true[:, 0], true[:, k]) for k in (4, 5, 6)], axis=1)
     inside = (imu[:, 0] >= true[0, 0]) & (imu[:, 0] <= true[-1, 0])
-    bias = (imu[inside, 4:7] - rate[inside]).mean(axis=0)
-    imu[:, 4:7] -= bias
-    np.savetxt(path, imu, fmt="%.9f")
-    return bias
+    return (imu[inside, 4:7] - rate[inside]).mean(axis=0)
+
+
+def gyro_bias_word(bias):
+    """For evstab replay --gyro-bias."""
+    return ",".join(f"{b:.6f}" for b in bias)

@@ -115,6 +115,7 @@ def test_usage():
                           ("--window", "area:0x26:200"), ("--window", "area:34x26:99999"), ("--window", "area:34x26:500:50-5"), ("--window", "area:34x26:500:5"),
                           ("--window", "count:100:5-"), ("--window", "count:100:5-9x"), ("--window", "time:100:5-9"), ("--rotation", "both"),
                           ("--saccade", "1"), ("--attitude", "magic"), ("--imu-offset-us", "1ms"), ("--imu-offset-us", "99999999"),
+                          ("--gyro-bias", "0.01"), ("--gyro-bias", "0.01,0.02"), ("--gyro-bias", "0,0,0.6"), ("--gyro-bias", "0,0,0,0"), ("--gyro-bias", "0,x,0"),
                           ("--from", "now"), ("--to", ""), ("--size", "240"), ("--size", "240x0"), ("--size", "4096x4096"),
                           ("--write", "pictures"), ("--write", "events,"), ("--write", "events;frames"), ("--image", "none"), ("--image", "iw"),
                           ("--warp", "off"), ("--velocity", "yes"), ("--method", "erl-v"), ("--baseline-ms", "30"),
@@ -168,6 +169,41 @@ def test_replay():
     check("and read rightly", a == (ROOT / "out/q/attitude.csv").read_bytes())
     expect("units of g are noticed", ["replay", recording("in_g", imu_txt=imu().replace("-9.7", "-0.99")), "-o", "out/g"], 0, "not about 9.8")
 
+    # What the gyro reads too much: the same as an IMU without it, by option and by parameter file, also in a batch.
+    biased = imu().splitlines()
+    biased = "\n".join(" ".join(row[:4] + [f"{float(w) + b:.6f}" for w, b in zip(row[4:], (0.05, -0.25, 0.01))])
+                       for row in (line.split() for line in biased)) + "\n"
+    recording("biased", imu_txt=biased)
+    told = ["--gyro-bias", "0.05,-0.25,0.01"]
+    expect("gyro bias not told", ["replay", "biased", "-o", "out/b0", "-q"], 0)
+    expect("gyro bias told", ["replay", "biased", "-o", "out/b1", "-q", *told], 0)
+    expect("gyro bias in YAML", ["replay", "biased", "-o", "out/b2", "-q", "--config", write("bias.yaml", "gyro_bias: [0.05, -0.25, 0.01]\n")], 0)
+    expect("the option counts more", ["replay", "biased", "-o", "out/b3", "-q", "--config", write("zero.yaml", "gyro_bias: [0, 0, 0]\n"), *told], 0)
+    expect("gyro bias in a batch", ["replay", "biased", folder, "-o", "out/b4", "-q", *told], 0)
+    expect("gyro bias, integration alone", ["replay", "biased", "-o", "out/b5", "-q", "--attitude", "gyro", *told], 0)
+
+    def turned(name):  # First to last orientation.
+        rows = [list(map(float, row.split(",")[1:5])) for row in (ROOT / name / "attitude.csv").read_text().splitlines()[1:]]
+        return [rows[0], rows[-1]]
+    for name in ("b1", "b2", "b3", "b4/biased"):
+        s = summary(f"out/{name}")
+        check(f"{name}: told", s["settings"]["gyro_bias_rad_s"] == [0.05, -0.25, 0.01] and s["attitude"]["gyro_bias_known"], s)
+        check(f"{name}: kept", s["attitude"]["gyro_bias_rad_s"] == [0.05, -0.25, 0.01], s["attitude"])
+    check("b5: kept", summary("out/b5")["attitude"]["gyro_bias_rad_s"] == [0.05, -0.25, 0.01])
+    s = summary("out/b0")
+    check("not told", "gyro_bias_rad_s" not in s["settings"] and not s["attitude"]["gyro_bias_known"], s)
+    plain, bias = turned("out/q"), turned("out/b1")
+    # (The plain one learns a little bias from its settling; a bias that is given stands.)
+    apart = max(abs(a - b) for p, q in zip(plain, bias) for a, b in zip(p, q))
+    check("subtracted: the same turn as without bias", apart < 2e-3, apart)
+    check("added it would not be", max(abs(a - b) for p, q in zip(plain, turned("out/b0")) for a, b in zip(p, q)) > 1e-2)
+    check("by whatever way it is told", all((ROOT / f"out/{n}/attitude.csv").read_bytes() == (ROOT / "out/b1/attitude.csv").read_bytes()
+                                            for n in ("b2", "b3", "b4/biased")))
+    expect("a bias of nothing", ["replay", folder, "-o", "out/b6", "--attitude", "truth", *told], 0, "the gyro bias is not used", n_lines=0)
+    check("is not told either", "gyro_bias_rad_s" not in summary("out/b6")["settings"])
+    for text in ("[0, 0]", "[0, 0, 0, 0]", "[0, 0, 0.6]", "[0, 0, nan]", "[a, b, c]"):
+        expect(f"gyro_bias: {text}", ["replay", folder, "-o", "out/b7", "--config", write("bad.yaml", f"K: [200, 0, 120, 0, 200, 90, 0, 0, 1]\ngyro_bias: {text}\n")], 1,
+               "bad.yaml: line 2: gyro_bias", n_lines=1)
     expect("count windows", ["replay", folder, "-o", "out/c", "--window", "count:100"], 0, ">20 windows")
     expect("count windows within limits", ["replay", folder, "-o", "out/c", "--window", "count:100:0-5.5"], 0, ">37 windows")
     c = summary("out/c")["settings"]
@@ -531,6 +567,13 @@ def test_attitude():
     check("quiet", run("attitude", "imu.csv", "-o", "q2.csv", "-q").stdout == "")
     for mode in ("gyro", "valenti"):
         expect(mode, ["attitude", "imu.csv", "-o", "q3.csv", "--mode", mode], 0, n_lines=0)
+    for mode in ("filter", "gyro"):  # Subtracted, and kept: what is left turns by 0.1 rad/s. (Valenti's rule takes any slow turn for bias.)
+        expect(f"bias, {mode}", ["attitude", "imu.csv", "-o", "q3.csv", "--mode", mode, "--gyro-bias", "0,-0,0.4"], 0, n_lines=0)
+        q = list(map(float, (ROOT / "q3.csv").read_text().splitlines()[-1].split(",")[1:]))
+        check(f"a bias of 0.4 rad/s is subtracted, {mode}", abs(2 * math.atan2(q[3], q[0]) - 0.1 * 4.99) < 0.01, q)
+    for text in ("0.01,0.02", "1,0,0", "0,0,x", "0,0,0,", "0;0;0"):
+        expect(f"--gyro-bias {text}", ["attitude", "imu.csv", "-o", "q4.csv", "--gyro-bias", text], 2, "--gyro-bias is '", "rad/s", n_lines=1)
+    check("nothing written by a wrong bias", not (ROOT / "q4.csv").exists())
     expect("wrong mode", ["attitude", "imu.csv", "-o", "q3.csv", "--mode", "kalman"], 2, "expected filter, gyro or valenti", n_lines=1)
 
     bad = list(rows)

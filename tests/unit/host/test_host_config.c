@@ -51,6 +51,24 @@ static void test_the_papers_parameter_names_are_understood(void)
     TEST_ASSERT_TRUE(config.has_from_imu && config.from_imu);
 }
 
+static void test_a_gyro_bias_can_be_told(void)
+{
+    static const char *const BAD[] = {"gyro_bias: 0.1\n", "gyro_bias: [0, 0, 0.51]\n", "gyro_bias: [0, -0.51, 0]\n",
+                                      "gyro_bias: [0, 0, 0, 0]\n"};
+    TEST_ASSERT_TRUE_MESSAGE(parse("imu:\n  gyro_bias: [0.5, -0.02, 1e-3]\n"), err.text);
+    TEST_ASSERT_TRUE(config.has_gyro_bias);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.5, config.gyro_bias_rad_s[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, -0.02, config.gyro_bias_rad_s[1]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.001, config.gyro_bias_rad_s[2]);
+    TEST_ASSERT_TRUE(parse("image: iwe\n"));
+    TEST_ASSERT_FALSE(config.has_gyro_bias);
+    for (size_t i = 0u; i < sizeof BAD / sizeof BAD[0]; i++) {
+        memset(&err, 0, sizeof err);
+        TEST_ASSERT_FALSE_MESSAGE(parse(BAD[i]), BAD[i]);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(err.text, "test.yaml: line 1: gyro_bias"), err.text);
+    }
+}
+
 static void test_what_becomes_of_a_window_can_be_told_too(void)
 {
     static const char *const BAD[] = {
@@ -194,6 +212,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_the_papers_parameter_names_are_understood);
+    RUN_TEST(test_a_gyro_bias_can_be_told);
     RUN_TEST(test_what_becomes_of_a_window_can_be_told_too);
     RUN_TEST(test_keys_nested_under_a_node_name_are_found);
     RUN_TEST(test_an_external_rotation_that_is_switched_off_is_not_used);
