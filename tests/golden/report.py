@@ -110,7 +110,14 @@ def check_page(page, temp, theme, flags, summary):
 
 # What a reader does, by script; what came of it is left in an element of its own.
 HANDS = """<p id="hands" hidden></p><script>
-window.setTimeout(() => {
+const whenReady = (act) => { /* The page says so itself; how long its pictures take to decode, nobody knows. */
+  const status = document.getElementById("status");
+  const look = () => status.textContent.includes('"ready":true') && (watcher.disconnect(), act(), true);
+  const watcher = new MutationObserver(look);
+  watcher.observe(status, { childList: true, characterData: true, subtree: true });
+  look();
+};
+whenReady(() => {
   const $ = (id) => document.getElementById(id);
   const out = {};
   const set = (id, value, event) => { $(id).value = value; $(id).dispatchEvent(new Event(event)); };
@@ -134,7 +141,7 @@ window.setTimeout(() => {
   out.wide = document.documentElement.scrollWidth - window.innerWidth;
   out.plain = [...document.querySelectorAll("canvas, svg")].filter((e) => !e.getAttribute("aria-label")).length;
   $("hands").textContent = JSON.stringify(out);
-}, 3000);
+});
 </script></body>"""
 
 
