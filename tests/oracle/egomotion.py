@@ -6,9 +6,9 @@
 usage: egomotion.py EVSTAB
 
 1. scipy.optimize.least_squares on the same robust cost, started at the truth: the directions must be close, by the
-   solver's own sigma. Left out, visibly, where scipy is missing.
+   solver's own sigma.
 2. OpenCV's essential matrix, of which nobody here chose the signs: on flow without noise the directions must agree.
-Exits 1 if they do not, 77 if OpenCV is missing.
+Exits 1 if they do not, 77 if scipy or OpenCV is missing.
 """
 import subprocess
 import sys
@@ -17,13 +17,10 @@ import tempfile
 try:
     import cv2
     import numpy as np
-except ImportError as error:
-    print(f"SKIPPED: {error}; install tests/requirements.txt to compare with OpenCV")
-    sys.exit(77)
-try:
     from scipy.optimize import least_squares
-except ImportError:
-    least_squares = None
+except ImportError as error:
+    print(f"SKIPPED: {error}; install tests/requirements.txt to compare with scipy and OpenCV")
+    sys.exit(77)
 
 F, N, FRAMES = 199.0, 300, 40
 RNG = np.random.default_rng(5)
@@ -98,9 +95,7 @@ def opencv(xy, uv):
 
 def main():
     evstab, failed = sys.argv[1], False
-    if least_squares is None:
-        print("left out: scipy is missing")
-    for noise, outliers in ((0.1, 0.0), (0.2, 0.3), (0.05, 0.5)) if least_squares else ():
+    for noise, outliers in ((0.1, 0.0), (0.2, 0.3), (0.05, 0.5)):
         scenes = [scene(noise, outliers) for _ in range(FRAMES)]
         found, sigma = solve(evstab, scenes)
         apart = np.array([angle_deg(f, minimum(xy, uv, f, v)) for f, (xy, uv, v) in zip(found, scenes)]) / sigma
