@@ -9,10 +9,12 @@
 enum {
     WIDE_STEPS = 2,   /* from the hypothesis to where the noise can be judged */
     NARROW_STEPS = 4, /* the noise is judged again after two of them */
+    LONGER = 12,      /* eighths: the weights fall off, so that the plain step is too short */
     SCALE_MIN = 20,   /* steps: 2 % of the median flow, what 16 bits resolve without loss */
     SCALE_MAX = 1 << EVS_EGO_MEDIAN_BITS,
     SCALE_WIDE = SCALE_MAX / 2,
     NOISE_VECTORS = 256, /* enough to choose a scale by */
+    HALVES_Q8 = 35,      /* sigma is at least 1 / 2.7 of how far a half of the image is off, the square in 1/256 */
     INLIER_LIMIT_MIN = 8 /* steps: the rounding of what is free of noise */
 };
 
@@ -157,10 +159,19 @@ static void put_spread(const evs_egomotion_config_t *cfg, const judgement_t *jud
     }
     /* few vectors fit themselves better than they fit the truth; and where outliers come in patches, more of the same
      * are likely among the good ones: the root is between ignoring that and believing it of all */
-    const int64_t n = (result->n_inliers > 5u) ? result->n_inliers : 5;
-    const evs_scaled_t few = evs_scaled_div(evs_scaled(n * cfg->variance_factor_q8, -8), evs_scaled(n - 4, 0));
-    const evs_scaled_t factor = evs_scaled_mul(few, evs_scaled_sqrt(judgement->patchiness));
+    const int64_t n = (result->n_inliers > 8u) ? result->n_inliers : 8;
+    const evs_scaled_t few = evs_scaled_div(evs_scaled(n * cfg->variance_factor_q8, -8), evs_scaled(n - 7, 0));
+    evs_scaled_t factor = evs_scaled_mul(few, evs_scaled_sqrt(judgement->patchiness));
+    /* and halves of the image that contradict each other say that some of the good vectors are not */
+    const evs_scaled_t var = evs_scaled_mul(evs_scaled_add(cov[0], cov[2]), factor);
+    const evs_scaled_t at_least = evs_scaled_mul(cov[3], evs_scaled(HALVES_Q8, -8));
+    if ((var.m > 0) && evs_scaled_less(var, at_least)) {
+        factor = evs_scaled_mul(factor, evs_scaled_div(at_least, var));
+    }
     for (unsigned i = 0u; i < 3u; i++) { cov[i] = evs_scaled_mul(cov[i], factor); }
+    /* flow is rounded, and equal vectors are alike: that does not average out */
+    cov[0] = evs_scaled_add(cov[0], evs_scaled(1, -24));
+    cov[2] = evs_scaled_add(cov[2], evs_scaled(1, -24));
     const evs_ego_frame_t f = evs_ego_frame(result->v_q30);
     const evs_scaled_t sigma = evs_scaled_sqrt(evs_scaled_add(cov[0], cov[2]));
     const int32_t sigma_q28 = evs_scaled_to_q(sigma, 28);
@@ -218,29 +229,55 @@ static uint32_t refine_rotation(const evs_egomotion_config_t *cfg, const evs_ego
     return s;
 }
 
+/* Where to refine from. The best of the hypotheses need not lie in the basin of the best answer: a direction that
+ * explains some of the scene and some of an object that moves by itself may fit more vectors roughly, but fewer well. So
+ * a few are led to where their minimum shows, and compared at the scale of the noise. */
+static evs_vec3_t start(const evs_ego_set_t *set)
+{
+    const uint32_t some = (set->n + EVS_EGO_SUBSET - 1u) / EVS_EGO_SUBSET;
+    evs_vec3_t v[EVS_EGO_CANDIDATES];
+    const uint32_t n = evs_ego_search(set, v);
+    uint32_t noise = UINT32_MAX;
+    for (uint32_t k = 0u; k < n; k++) {
+        for (int i = 0; i < WIDE_STEPS; i++) { (void)evs_ego_step(set, SCALE_WIDE, some, 8, &v[k]); }
+        const uint32_t noise_here = evs_ego_noise(set, v[k], NOISE_VECTORS);
+        if (noise_here < noise) { noise = noise_here; }
+    }
+    uint32_t best = 0u;
+    uint32_t most = 0u;
+    for (uint32_t k = 0u; k < n; k++) {
+        (void)evs_ego_step(set, kernel_scale(noise), some, 8, &v[k]);
+        const uint32_t scale = (uint32_t)evs_clamp((int32_t)noise, SCALE_MIN, SCALE_MAX);
+        const uint32_t explained = evs_ego_explained(set, v[k], scale, NOISE_VECTORS);
+        if (explained > most) {
+            best = k;
+            most = explained;
+        }
+    }
+    return v[best];
+}
+
 static void solve_robust(const evs_egomotion_config_t *cfg, const evs_ego_call_t *call, evs_egomotion_result_t *result)
 {
     const evs_ego_set_t *const set = &call->set;
     const bool with_rotation = cfg->rotation_sigma_rad_q28 > 0;
     evs_ego_rotation_t rot = {{0, 0, 0}, {0, 0}};
-    evs_vec3_t v = evs_ego_search(set);
     uint32_t s = SCALE_WIDE;
-    const uint32_t some = (set->n + EVS_EGO_SUBSET - 1u) / EVS_EGO_SUBSET;
-    for (int i = 0; i < WIDE_STEPS; i++) { (void)evs_ego_step(set, s, some, &v); }
+    evs_vec3_t v = start(set);
     if (with_rotation) {
         s = refine_rotation(cfg, call, &v, &rot, result);
     } else {
         const uint32_t fewer = (set->n + NOISE_VECTORS - 1u) / NOISE_VECTORS;
         for (int i = 0; i < NARROW_STEPS; i++) {
             if ((i & 1) == 0) { s = kernel_scale(evs_ego_noise(set, v, NOISE_VECTORS)); }
-            (void)evs_ego_step(set, s, (i < 2) ? fewer : 1u, &v); /* what the later ones correct costs half */
+            (void)evs_ego_step(set, s, (i < 2) ? fewer : 1u, LONGER, &v); /* what the later ones correct costs half */
         }
     }
     result->v_q30 = v;
     const judgement_t j = judge(set, result);
     if (evs_ego_is_rotation(set, v, s)) { result->flags |= EVS_EGOMOTION_ROTATION; }
     const evs_ego_frame_t f = evs_ego_frame(v);
-    evs_scaled_t cov[3];
+    evs_scaled_t cov[4];
     const bool definite = with_rotation ? evs_ego_covariance_rotation(set, &f, s, j.noise, rot.prior, cov)
                                         : evs_ego_covariance(set, &f, s, cov);
     put_spread(cfg, &j, definite ? cov : NULL, result);
@@ -252,7 +289,7 @@ static void solve_paper(const evs_egomotion_config_t *cfg, const evs_ego_call_t 
 {
     const evs_ego_set_t *const set = &call->set;
     const bool joint = cfg->method == EVS_EGOMOTION_ERL;
-    evs_scaled_t cov[3];
+    evs_scaled_t cov[4];
     const bool definite = evs_ego_paper(set, joint, call->likelihood, result, cov);
     evs_ego_repack(set, call->flow, call->n, result);
     const judgement_t j = judge(set, result);

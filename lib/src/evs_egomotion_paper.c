@@ -222,7 +222,7 @@ static evs_vec3_t downhill(const paper_t *e, evs_vec3_t v, uint64_t least)
 
 /* Sums of w^2 J J', and of w^2 r J by cells, for the first dim unknowns. */
 static void add_up(const paper_t *e, const evs_ego_frame_t *f, const evs_ego_turn_t *turn, unsigned dim, int64_t *h,
-                   int64_t *z)
+                   evs_ego_cell_sum_t *cells)
 {
     const evs_ego_set_t *const set = e->set;
     const evs_ego_loop_t loop = evs_ego_loop(set, f, 1u << EVS_EGO_MEDIAN_BITS); /* for its directions */
@@ -248,7 +248,7 @@ static void add_up(const paper_t *e, const evs_ego_frame_t *f, const evs_ego_tur
         unsigned at = 0u;
         for (unsigned k = 0u; k < dim; k++) {
             const int32_t wj = evs_ego_weigh(weight_q30, inv, j[k]);
-            z[dim * evs_ego_cell(set, &p) + k] += evs_ego_gradient(wr_q2, j[k]);
+            cells[evs_ego_cell(set, &p)].z[k] += evs_ego_gradient(wr_q2, j[k]);
             for (unsigned l = 0u; l <= k; l++) { h[at++] += (int64_t)wj * j[l]; }
         }
     }
@@ -280,7 +280,7 @@ static int32_t turn_to_rad_q28(const evs_egomotion_result_t *scale, int32_t w_q8
 }
 
 bool evs_ego_paper(const evs_ego_set_t *set, bool joint, uint32_t *likelihood, evs_egomotion_result_t *result,
-                   evs_scaled_t cov[3])
+                   evs_scaled_t cov[4])
 {
     paper_t e = {.set = set, .likelihood = likelihood, .joint = joint, .weighted = false};
     const unsigned dim = joint ? 5u : 2u;
@@ -301,9 +301,10 @@ bool evs_ego_paper(const evs_ego_set_t *set, bool joint, uint32_t *likelihood, e
     int64_t sums[N_TRIANGLE];
     evs_scaled_t h[N_TRIANGLE];
     evs_scaled_t m[N_TRIANGLE];
-    int64_t *const z = evs_ego_cells(set, dim);
-    add_up(&e, &f, &turn, dim, sums, z);
+    evs_ego_cell_sum_t *const cells = evs_ego_cells(set);
+    add_up(&e, &f, &turn, dim, sums, cells);
     for (unsigned k = 0u; k < dim * (dim + 1u) / 2u; k++) { h[k] = evs_scaled(sums[k], 0); }
-    evs_ego_spread(z, dim, m);
+    evs_ego_spread(cells, dim, m);
+    cov[3] = evs_scaled(0, 0);
     return evs_ego_sandwich(h, m, dim, cov);
 }

@@ -34,12 +34,16 @@ typedef struct {
     int16_t v;
 } evs_ego_vector_t;
 
-/* Some of them for the search, a row per coordinate. */
+/* For which V a vector fits, as the search asks it: its products with a and b are both positive. */
 typedef struct {
-    int16_t x[EVS_EGO_SUBSET];
-    int16_t y[EVS_EGO_SUBSET];
-    int16_t u[EVS_EGO_SUBSET];
-    int16_t v[EVS_EGO_SUBSET];
+    int16_t a_xy[2];
+    int16_t b_xy[2];
+    int16_t a_z;
+    int16_t b_z;
+} evs_ego_wedge_t;
+
+typedef struct {
+    evs_ego_wedge_t wedge[EVS_EGO_SUBSET];
 } evs_ego_subset_t;
 
 EVS_STATIC_ASSERT(sizeof(evs_ego_subset_t) + sizeof(evs_ego_vector_t) + sizeof(uint16_t) <= EVS_EGOMOTION_BYTES(1),
@@ -59,7 +63,7 @@ typedef struct {
 } evs_ego_set_t;
 
 /* Vectors of one cell err together, it is supposed: a moving object, or windows of the tracker that overlap. */
-enum { EVS_EGO_COLUMNS = 4, EVS_EGO_ROWS = 3, EVS_EGO_CELLS = EVS_EGO_COLUMNS * EVS_EGO_ROWS };
+enum { EVS_EGO_COLUMNS = 4, EVS_EGO_ROWS = 4, EVS_EGO_CELLS = EVS_EGO_COLUMNS * EVS_EGO_ROWS };
 
 static inline uint32_t evs_ego_cell(const evs_ego_set_t *set, const evs_ego_vector_t *p)
 {
@@ -304,29 +308,40 @@ uint16_t evs_ego_select(const uint16_t *key, uint32_t n, uint32_t k);
 
 /* --- evs_egomotion_search.c --- */
 
-/* The best of the signed hypotheses. */
-evs_vec3_t evs_ego_search(const evs_ego_set_t *set);
+enum { EVS_EGO_CANDIDATES = 3 };
+/* The best of the signed hypotheses, and the next best that are 25 degrees from the better ones; returns how many. */
+uint32_t evs_ego_search(const evs_ego_set_t *set, evs_vec3_t best[EVS_EGO_CANDIDATES]);
 
 /* --- evs_egomotion_refine.c --- */
 
 evs_ego_frame_t evs_ego_frame(evs_vec3_t v_q30);
 /* Move along the tangent plane by (d0, d1), at most half a radian, and normalize. */
 evs_vec3_t evs_ego_move(const evs_ego_frame_t *f, evs_scaled_t d0, evs_scaled_t d1);
-/* A Gauss-Newton step with Geman-McClure weights of scale s on every stride-th vector; false: no step was possible. */
-bool evs_ego_step(const evs_ego_set_t *set, uint32_t s, uint32_t stride, evs_vec3_t *v_q30);
+/* A Gauss-Newton step, made longer by eighths / 8, with Geman-McClure weights of scale s on every stride-th vector.
+ * False: no step was possible. */
+bool evs_ego_step(const evs_ego_set_t *set, uint32_t s, uint32_t stride, int32_t eighths, evs_vec3_t *v_q30);
 /* Robust 1 sigma of the residuals in steps, from at most n_max vectors. */
 uint32_t evs_ego_noise(const evs_ego_set_t *set, evs_vec3_t v_q30, uint32_t n_max);
-/* Sandwich covariance of v under the kernel of scale s: the sum is in the tangent plane 00, 01, 11, rad^2.
- * False: not positive definite. */
-bool evs_ego_covariance(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint32_t s, evs_scaled_t cov[3]);
+/* How well v explains at most n_max of the vectors: the sum of their weights, Q15. */
+uint32_t evs_ego_explained(const evs_ego_set_t *set, evs_vec3_t v_q30, uint32_t s, uint32_t n_max);
+/* Sandwich covariance of v under the kernel of scale s in the tangent plane: 00, 01, 11, rad^2; then what
+ * evs_ego_halves_apart() says. False: not positive definite. */
+bool evs_ego_covariance(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint32_t s, evs_scaled_t cov[4]);
 /* The first two rows and columns of H^-1 M H^-1, as above; lower triangles by rows. False: H is singular. */
-bool evs_ego_sandwich(const evs_scaled_t *h, const evs_scaled_t *m, unsigned dim, evs_scaled_t cov[3]);
+bool evs_ego_sandwich(const evs_scaled_t *h, const evs_scaled_t *m, unsigned dim, evs_scaled_t cov[4]);
 
-/* Room for the sums z[EVS_EGO_CELLS][dim] of the gradient over the cells, cleared. It takes the place of the subset,
- * which nobody needs after the search. */
-int64_t *evs_ego_cells(const evs_ego_set_t *set, unsigned dim);
+/* What one cell adds to the Hessian of v, and to the gradient in 4 steps^2. */
+typedef struct {
+    int64_t h[3];
+    int64_t z[EVS_SCALED_DIM_MAX];
+} evs_ego_cell_sum_t;
+
+/* Room for the sums of all cells, cleared. It takes the place of the subset, which nobody needs after the search. */
+evs_ego_cell_sum_t *evs_ego_cells(const evs_ego_set_t *set);
 /* Variance of the gradient, from these sums. */
-void evs_ego_spread(const int64_t *z, unsigned dim, evs_scaled_t *m);
+void evs_ego_spread(const evs_ego_cell_sum_t *cells, unsigned dim, evs_scaled_t *m);
+/* How far a step from the vectors in one half of the image leads at most: the four halves' largest, squared. */
+evs_scaled_t evs_ego_halves_apart(const evs_ego_cell_sum_t *cells, evs_scaled_t kappa);
 
 /* --- evs_egomotion_rotation.c --- */
 
@@ -344,7 +359,7 @@ bool evs_ego_step_rotation(const evs_ego_set_t *set, const evs_egomotion_result_
                            evs_vec3_t *v_q30, evs_ego_rotation_t *rot);
 /* As evs_ego_covariance(), with the rotation's share. */
 bool evs_ego_covariance_rotation(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint32_t s, uint32_t noise,
-                                 evs_scaled_t prior, evs_scaled_t cov[3]);
+                                 evs_scaled_t prior, evs_scaled_t cov[4]);
 /* What one unit of the rotation's slopes is in rad. */
 evs_scaled_t evs_ego_rotation_unit(const evs_ego_set_t *set, const evs_egomotion_result_t *scale);
 /* Whether a rotation alone explains the vectors as well as v does, under a kernel of scale s. */
@@ -355,6 +370,6 @@ bool evs_ego_is_rotation(const evs_ego_set_t *set, evs_vec3_t v_q30, uint32_t s)
 /* The published estimators: v, and with `joint` the rotation, into the result; cov as of evs_ego_covariance(). The set
  * is packed without rotation. `likelihood` has room for set->n. False: no minimum with a covariance. */
 bool evs_ego_paper(const evs_ego_set_t *set, bool joint, uint32_t *likelihood, evs_egomotion_result_t *result,
-                   evs_scaled_t cov[3]);
+                   evs_scaled_t cov[4]);
 
 #endif

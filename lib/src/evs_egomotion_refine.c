@@ -53,7 +53,7 @@ evs_ego_scale_t evs_ego_scale(uint32_t s)
 
 /* --- steps ------------------------------------------------------------------------------------------------------ */
 
-bool evs_ego_step(const evs_ego_set_t *set, uint32_t s, uint32_t stride, evs_vec3_t *v_q30)
+bool evs_ego_step(const evs_ego_set_t *set, uint32_t s, uint32_t stride, int32_t eighths, evs_vec3_t *v_q30)
 {
     const evs_ego_frame_t f = evs_ego_frame(*v_q30);
     const evs_ego_loop_t loop = evs_ego_loop(set, &f, s);
@@ -71,6 +71,7 @@ bool evs_ego_step(const evs_ego_set_t *set, uint32_t s, uint32_t stride, evs_vec
     evs_scaled_t h[3] = {evs_scaled(h00, 0), evs_scaled(h01, 0), evs_scaled(h11, 0)};
     evs_scaled_t step[2] = {evs_scaled(-g0_q2, -2), evs_scaled(-g1_q2, -2)};
     if (!evs_scaled_solve(h, step, 2u)) { return false; }
+    for (unsigned i = 0u; i < 2u; i++) { step[i] = evs_scaled_mul(step[i], evs_scaled(eighths, -3)); }
     *v_q30 = evs_ego_move(&f, step[0], step[1]);
     return true;
 }
@@ -93,6 +94,21 @@ uint32_t evs_ego_noise(const evs_ego_set_t *set, evs_vec3_t v_q30, uint32_t n_ma
     return (uint32_t)(((uint64_t)evs_sqrt_u64(r2_q4 << 16) * 205672u) >> 26);
 }
 
+uint32_t evs_ego_explained(const evs_ego_set_t *set, evs_vec3_t v_q30, uint32_t s, uint32_t n_max)
+{
+    const evs_ego_dir_t dir = evs_ego_dir(set, v_q30);
+    const evs_ego_scale_t kernel = evs_ego_scale(s);
+    const uint32_t stride = (set->n + n_max - 1u) / n_max;
+    uint32_t sum = 0u;
+    for (uint32_t i = 0u; i < set->n; i += stride) {
+        const evs_ego_view_t w = evs_ego_view(&set->vec[i], dir);
+        if (w.d <= 0) { continue; }
+        const uint32_t share = evs_ego_share_q15(kernel, &w);
+        sum += (share * share) >> 15;
+    }
+    return sum;
+}
+
 /* --- covariance ------------------------------------------------------------------------------------------------- */
 
 static unsigned at(unsigned i, unsigned j) { return (i >= j) ? i * (i + 1u) / 2u + j : j * (j + 1u) / 2u + i; }
@@ -109,22 +125,23 @@ static evs_scaled_t form(const evs_scaled_t *m, const evs_scaled_t *x, const evs
     return sum;
 }
 
-EVS_STATIC_ASSERT(EVS_EGO_CELLS *EVS_SCALED_DIM_MAX * sizeof(int64_t) + 7u <= sizeof(evs_ego_subset_t),
+EVS_STATIC_ASSERT(EVS_EGO_CELLS * sizeof(evs_ego_cell_sum_t) + 7u <= sizeof(evs_ego_subset_t),
                   "the cells fit, wherever an 8-byte boundary lies");
 
-int64_t *evs_ego_cells(const evs_ego_set_t *set, unsigned dim)
+evs_ego_cell_sum_t *evs_ego_cells(const evs_ego_set_t *set)
 {
     unsigned char *const at = (unsigned char *)set->subset;
-    int64_t *const z = (int64_t *)(void *)(at + ((8u - ((uintptr_t)at & 7u)) & 7u));
-    memset(z, 0, EVS_EGO_CELLS * dim * sizeof z[0]);
-    return z;
+    evs_ego_cell_sum_t *const cells = (evs_ego_cell_sum_t *)(void *)(at + ((8u - ((uintptr_t)at & 7u)) & 7u));
+    memset(cells, 0, EVS_EGO_CELLS * sizeof cells[0]);
+    return cells;
 }
 
-void evs_ego_spread(const int64_t *z, unsigned dim, evs_scaled_t *m)
+void evs_ego_spread(const evs_ego_cell_sum_t *cells, unsigned dim, evs_scaled_t *m)
 {
     int32_t n_used = 0;
     for (unsigned i = 0u; i < dim * (dim + 1u) / 2u; i++) { m[i] = evs_scaled(0, 0); }
-    for (unsigned c = 0u; c < EVS_EGO_CELLS; c++, z += dim) {
+    for (unsigned c = 0u; c < EVS_EGO_CELLS; c++) {
+        const int64_t *const z = cells[c].z;
         unsigned k = 0u;
         int64_t any = 0;
         for (unsigned i = 0u; i < dim; i++) {
@@ -139,6 +156,33 @@ void evs_ego_spread(const int64_t *z, unsigned dim, evs_scaled_t *m)
     const int32_t free = (n_used > (int32_t)dim) ? n_used - (int32_t)dim : 1;
     const evs_scaled_t correction = evs_scaled_div(evs_scaled(n_used, 0), evs_scaled(free, 0));
     for (unsigned i = 0u; i < dim * (dim + 1u) / 2u; i++) { m[i] = evs_scaled_mul(m[i], correction); }
+}
+
+static bool in_half(unsigned cell, unsigned half)
+{
+    const unsigned column = cell % EVS_EGO_COLUMNS;
+    const unsigned row = cell / EVS_EGO_COLUMNS;
+    const bool second = (half < 2u) ? (column >= EVS_EGO_COLUMNS / 2u) : (row >= EVS_EGO_ROWS / 2u);
+    return second == ((half & 1u) != 0u);
+}
+
+evs_scaled_t evs_ego_halves_apart(const evs_ego_cell_sum_t *cells, evs_scaled_t kappa)
+{
+    evs_scaled_t most = evs_scaled(0, 0);
+    for (unsigned half = 0u; half < 4u; half++) {
+        evs_ego_cell_sum_t sum = {{0}, {0}};
+        for (unsigned c = 0u; c < EVS_EGO_CELLS; c++) {
+            if (!in_half(c, half)) { continue; }
+            for (unsigned i = 0u; i < 3u; i++) { sum.h[i] += cells[c].h[i]; }
+            for (unsigned i = 0u; i < 2u; i++) { sum.z[i] += cells[c].z[i]; }
+        }
+        evs_scaled_t h[3] = {evs_scaled(sum.h[0], 0), evs_scaled(sum.h[1], 0), evs_scaled(sum.h[2], 0)};
+        evs_scaled_t step[2] = {evs_scaled(sum.z[0], 2), evs_scaled(sum.z[1], 2)};
+        if (!evs_scaled_solve(h, step, 2u)) { continue; }
+        const evs_scaled_t sq = evs_scaled_add(evs_scaled_mul(step[0], step[0]), evs_scaled_mul(step[1], step[1]));
+        if (evs_scaled_less(most, sq)) { most = sq; }
+    }
+    return evs_scaled_div(most, evs_scaled_mul(kappa, kappa));
 }
 
 bool evs_ego_sandwich(const evs_scaled_t *h, const evs_scaled_t *m, unsigned dim, evs_scaled_t cov[3])
@@ -156,35 +200,40 @@ bool evs_ego_sandwich(const evs_scaled_t *h, const evs_scaled_t *m, unsigned dim
     return true;
 }
 
-bool evs_ego_covariance(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint32_t s, evs_scaled_t cov[3])
+bool evs_ego_covariance(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint32_t s, evs_scaled_t cov[4])
 {
     const evs_ego_loop_t loop = evs_ego_loop(set, f, s);
-    int64_t h00 = 0, h01 = 0, h11 = 0;
-    int64_t curvature = 0;                     /* sum of psi' |J|^2: the trace of the true Hessian */
-    int64_t *const z = evs_ego_cells(set, 2u); /* the gradient, by cells */
-    uint64_t spread = 0u;                      /* sum of its squares, vector by vector */
+    int64_t total[3] = {0, 0, 0};
+    int64_t curvature = 0; /* sum of psi' |J|^2: the trace of the true Hessian */
+    uint64_t spread = 0u;  /* sum of the squares of the gradient, vector by vector */
+    evs_ego_cell_sum_t *const cells = evs_ego_cells(set);
     for (uint32_t i = 0u; i < set->n; i++) {
         evs_ego_pull_t a;
         if (!evs_ego_pull(set, &set->vec[i], &loop, &a)) { continue; }
-        h00 += (int64_t)a.k0 * a.j.j0;
-        h01 += (int64_t)a.k0 * a.j.j1;
-        h11 += (int64_t)a.k1 * a.j.j1;
+        evs_ego_cell_sum_t *const cell = &cells[evs_ego_cell(set, &set->vec[i])];
+        cell->h[0] += (int64_t)a.k0 * a.j.j0;
+        cell->h[1] += (int64_t)a.k0 * a.j.j1;
+        cell->h[2] += (int64_t)a.k1 * a.j.j1;
         curvature += (int64_t)evs_ego_bend(&a, a.k0) * a.j.j0 + (int64_t)evs_ego_bend(&a, a.k1) * a.j.j1;
         const int32_t z0 = evs_ego_gradient(a.wr_q2, a.j.j0);
         const int32_t z1 = evs_ego_gradient(a.wr_q2, a.j.j1);
-        int64_t *const cell = z + 2u * evs_ego_cell(set, &set->vec[i]);
-        cell[0] += z0;
-        cell[1] += z1;
+        cell->z[0] += z0;
+        cell->z[1] += z1;
         spread += (uint64_t)((int64_t)z0 * z0) + (uint64_t)((int64_t)z1 * z1);
     }
     if (curvature <= 0) { return false; }
+    for (unsigned c = 0u; c < EVS_EGO_CELLS; c++) {
+        for (unsigned i = 0u; i < 3u; i++) { total[i] += cells[c].h[i]; }
+    }
     /* cov = H^-1 M H^-1 / kappa^2, kappa being the trace of the true Hessian over that of H: the true one by itself
      * need not be positive, and its inverse would be noise. */
-    const evs_scaled_t kappa = evs_scaled_div(evs_scaled(curvature, 0), evs_scaled(h00 + h11, 0));
-    const evs_scaled_t h[3] = {evs_scaled_mul(evs_scaled(h00, 0), kappa), evs_scaled_mul(evs_scaled(h01, 0), kappa),
-                               evs_scaled_mul(evs_scaled(h11, 0), kappa)};
+    const evs_scaled_t kappa = evs_scaled_div(evs_scaled(curvature, 0), evs_scaled(total[0] + total[2], 0));
+    const evs_scaled_t h[3] = {evs_scaled_mul(evs_scaled(total[0], 0), kappa),
+                               evs_scaled_mul(evs_scaled(total[1], 0), kappa),
+                               evs_scaled_mul(evs_scaled(total[2], 0), kappa)};
     evs_scaled_t m[3];
-    evs_ego_spread(z, 2u, m);
+    evs_ego_spread(cells, 2u, m);
+    cov[3] = evs_ego_halves_apart(cells, kappa);
     /* cells are few: should chance have made their sums small, believe the vectors */
     const evs_scaled_t at_least = evs_scaled((int64_t)(spread >> 1), 5);
     const evs_scaled_t trace = evs_scaled_add(m[0], m[2]);

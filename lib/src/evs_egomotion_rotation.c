@@ -14,7 +14,7 @@ typedef struct {
 
 /* What tells the spread of the result. */
 typedef struct {
-    int64_t *z;        /* the gradient by cells, in 4 steps^2 */
+    evs_ego_cell_sum_t *cells;
     int64_t curvature; /* sum of psi' |J|^2 over the two of v */
 } spread_t;
 
@@ -42,8 +42,11 @@ static void add_up(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint32_t 
             for (unsigned l = 0u; l <= k; l++) { sums->h[at++] += (int64_t)wj * j[l]; }
         }
         if (spread == NULL) { continue; }
-        int64_t *const cell = spread->z + DIM * evs_ego_cell(set, p);
-        for (unsigned k = 0u; k < DIM; k++) { cell[k] += evs_ego_gradient(a.wr_q2, j[k]); }
+        evs_ego_cell_sum_t *const cell = &spread->cells[evs_ego_cell(set, p)];
+        cell->h[0] += (int64_t)a.k0 * j[0];
+        cell->h[1] += (int64_t)a.k0 * j[1];
+        cell->h[2] += (int64_t)a.k1 * j[1];
+        for (unsigned k = 0u; k < DIM; k++) { cell->z[k] += evs_ego_gradient(a.wr_q2, j[k]); }
         spread->curvature += (int64_t)evs_ego_bend(&a, a.k0) * j[0] + (int64_t)evs_ego_bend(&a, a.k1) * j[1];
     }
 }
@@ -92,17 +95,18 @@ bool evs_ego_step_rotation(const evs_ego_set_t *set, const evs_egomotion_result_
 }
 
 bool evs_ego_covariance_rotation(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint32_t s, uint32_t noise,
-                                 evs_scaled_t prior, evs_scaled_t cov[3])
+                                 evs_scaled_t prior, evs_scaled_t cov[4])
 {
     sums_t sums;
     evs_scaled_t h[N_TRIANGLE];
     evs_scaled_t m[N_TRIANGLE];
-    spread_t spread = {.z = evs_ego_cells(set, DIM), .curvature = 0};
+    spread_t spread = {.cells = evs_ego_cells(set), .curvature = 0};
     add_up(set, f, s, 1u, &sums, &spread);
     if (spread.curvature <= 0) { return false; }
     const evs_scaled_t kappa = evs_scaled_div(evs_scaled(spread.curvature, 0), evs_scaled(sums.h[0] + sums.h[2], 0));
     for (unsigned i = 0u; i < N_TRIANGLE; i++) { h[i] = evs_scaled_mul(evs_scaled(sums.h[i], 0), kappa); }
-    evs_ego_spread(spread.z, DIM, m);
+    evs_ego_spread(spread.cells, DIM, m);
+    cov[3] = evs_ego_halves_apart(spread.cells, kappa);
     const evs_scaled_t of_prior = evs_scaled_mul(prior, evs_scaled((int64_t)noise * noise + 1, 0));
     for (unsigned k = 0u; k < 3u; k++) {
         const unsigned at = (2u + k) * (3u + k) / 2u + 2u + k;

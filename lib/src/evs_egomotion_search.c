@@ -2,6 +2,9 @@
  * SPDX-FileCopyrightText: 2026 the evstab authors */
 /* The search for the basin that holds the answer: no refinement finds it by itself when many vectors are outliers. */
 #include "evs_egomotion_private.h"
+#include "evs_simd.h"
+
+#include <string.h>
 
 /* z = 1 - (i + 1/2) / 64, turned by the golden angle from one to the next: equal areas, gaps of 6.9 degrees on average
  * and at most 13.6. Q14. */
@@ -22,63 +25,130 @@ static const int16_t HEMISPHERE[N_HYPOTHESES][3] = {
     {14234, -8064, 896},    {-5052, 15573, 640},   {-6797, -14903, 384},  {15082, 6399, 128},
 };
 
+/* A vector fits within s = 0.35 of the median flow, the root of 1/8. */
+enum { S = 362, S2 = S * S, K_MAX_Q12 = 16 << 12 };
+
+static void put_normal(int32_t x, int32_t y, int32_t z, int16_t xy[2], int16_t *z_out)
+{
+    const unsigned n_lead = evs_clz32(evs_abs_u32(x) | evs_abs_u32(y) | evs_abs_u32(z));
+    const unsigned down = (n_lead < 17u) ? 17u - n_lead : 0u;
+    xy[0] = (int16_t)(x >> down);
+    xy[1] = (int16_t)(y >> down);
+    *z_out = (int16_t)(z >> down);
+}
+
+/* c and d are linear in V: c = n V, d = m V. As c^2 + d^2 = |u|^2 |a|^2, the residual is below s and the depth positive
+ * where |c| <= k d, k = s / sqrt(|u|^2 - s^2): that is where the products of V with k m + n and with k m - n are both
+ * positive. For -V both are negative. */
+static void make_wedge(const evs_ego_set_t *set, const evs_ego_vector_t *p, evs_ego_wedge_t *w)
+{
+    const int32_t u2 = p->u * p->u + p->v * p->v;
+    const unsigned shift = set->one_bits + 1u;
+    const int32_t mz = (p->u * p->x + p->v * p->y) >> shift;
+    int32_t k_q12 = K_MAX_Q12;
+    if (u2 > S2 + S2 / 256) { k_q12 = (int32_t)((uint32_t)(S << 12) / evs_sqrt_u64((uint64_t)(uint32_t)(u2 - S2))); }
+    const int32_t m[3] = {(-p->u * k_q12) >> 12, (-p->v * k_q12) >> 12, (int32_t)(((int64_t)mz * k_q12) >> 12)};
+    const int32_t n[3] = {p->v, -p->u, (p->u * p->y - p->v * p->x) >> shift};
+    put_normal(m[0] + n[0], m[1] + n[1], m[2] + n[2], w->a_xy, &w->a_z);
+    put_normal(m[0] - n[0], m[1] - n[1], m[2] - n[2], w->b_xy, &w->b_z);
+}
+
 /* Every so many of the vectors, so that they come from all over the list. */
 static uint32_t pick(const evs_ego_set_t *set)
 {
     const uint32_t n = (set->n < EVS_EGO_SUBSET) ? set->n : EVS_EGO_SUBSET;
     const uint32_t stride_q16 = (set->n << 16) / n; /* n <= 65535 */
-    evs_ego_subset_t *const s = set->subset;
     uint32_t at_q16 = 0u;
     for (uint32_t i = 0u; i < n; i++, at_q16 += stride_q16) {
-        const evs_ego_vector_t p = set->vec[at_q16 >> 16];
-        s->x[i] = p.x;
-        s->y[i] = p.y;
-        s->u[i] = p.u;
-        s->v[i] = p.v;
+        make_wedge(set, &set->vec[at_q16 >> 16], &set->subset->wedge[i]);
     }
     return n;
 }
 
-/* How many vectors fit a direction and its opposite: the residual is below 0.35 of the median flow (the root of 1/8),
- * the inverse depth positive. A plain count spares a division per vector and hypothesis; the accuracy in the end is
- * that of a smooth kernel, and where an object moves by itself a narrow count is better. */
-static void score(const evs_ego_subset_t *s, uint32_t n, evs_ego_dir_t dir, uint32_t points[2])
+#if EVS_SIMD_DSP
+
+typedef struct {
+    int32_t xy; /* packed */
+    int32_t z;
+} plane_t;
+
+static inline plane_t plane(const int16_t v[3])
 {
-    uint32_t all = 0u;
-    uint32_t forward = 0u;
-    for (uint32_t i = 0u; i < n; i++) {
-        const int32_t ax = (s->x[i] * dir.z - dir.x) >> 16;
-        const int32_t ay = (s->y[i] * dir.z - dir.y) >> 16;
-        const int32_t c = (s->u[i] * ay - s->v[i] * ax) >> 12;
-        const int32_t d = s->u[i] * ax + s->v[i] * ay;
-        const int32_t a2 = ax * ax + ay * ay;
-        const uint32_t fits =
-            ((uint32_t)c * (uint32_t)c <= (uint32_t)a2 >> 7) ? 1u : 0u; /* r^2 <= 2^20 / 8, over 2^24 */
-        all += fits;
-        forward += (d > 0) ? fits : 0u;
-    }
-    points[0] = forward;
-    points[1] = all - forward;
+    const plane_t p = {(int32_t)((uint32_t)(uint16_t)v[0] | ((uint32_t)(uint16_t)v[1] << 16)), v[2]};
+    return p;
 }
 
-evs_vec3_t evs_ego_search(const evs_ego_set_t *set)
+static inline int32_t product(const int16_t xy[2], int16_t z, plane_t v)
+{
+    int32_t both;
+    int32_t sum;
+    memcpy(&both, xy, sizeof both); /* aligned: see evs_ego_wedge_t */
+    __asm__("smlad %0, %1, %2, %3" : "=r"(sum) : "r"(both), "r"(v.xy), "r"(z * v.z));
+    return sum;
+}
+
+#else
+
+typedef struct {
+    int32_t x;
+    int32_t y;
+    int32_t z;
+} plane_t;
+
+static inline plane_t plane(const int16_t v[3])
+{
+    const plane_t p = {v[0], v[1], v[2]};
+    return p;
+}
+
+static inline int32_t product(const int16_t xy[2], int16_t z, plane_t v) { return xy[0] * v.x + xy[1] * v.y + z * v.z; }
+
+#endif
+
+/* How many vectors fit a direction and its opposite. A plain count spares a division per vector and hypothesis. */
+static void score(const evs_ego_wedge_t *w, uint32_t n, const int16_t v[3], uint8_t points[2])
+{
+    const plane_t p = plane(v);
+    uint32_t not_forward = 0u;
+    uint32_t backward = 0u;
+    for (uint32_t i = 0u; i < n; i++) {
+        const int32_t a = product(w[i].a_xy, w[i].a_z, p);
+        const int32_t b = product(w[i].b_xy, w[i].b_z, p);
+        not_forward += (uint32_t)(a | b) >> 31;
+        backward += (uint32_t)(a & b) >> 31;
+    }
+    points[0] = (uint8_t)(n - not_forward);
+    points[1] = (uint8_t)backward;
+}
+
+enum { APART_Q28 = 243283000 }; /* the cosine of 25 degrees */
+
+static int32_t dot_q28(const int16_t a[3], const int16_t b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+uint32_t evs_ego_search(const evs_ego_set_t *set, evs_vec3_t best[EVS_EGO_CANDIDATES])
 {
     const uint32_t n = pick(set);
-    uint32_t most = 0u;
-    evs_vec3_t best = {0, 0, EVS_ONE_Q30};
-    for (int h = 0; h < N_HYPOTHESES; h++) {
-        const evs_vec3_t v = {HEMISPHERE[h][0] * 65536, HEMISPHERE[h][1] * 65536, HEMISPHERE[h][2] * 65536};
-        uint32_t points[2];
-        score(set->subset, n, evs_ego_dir(set, v), points);
-        if (points[0] > most) {
-            most = points[0];
-            best = v;
+    uint8_t points[N_HYPOTHESES][2];
+    for (int h = 0; h < N_HYPOTHESES; h++) { score(set->subset->wedge, n, HEMISPHERE[h], points[h]); }
+    for (uint32_t k = 0u; k < EVS_EGO_CANDIDATES; k++) {
+        int at = 0;
+        int side = 0;
+        for (int h = 0; h < N_HYPOTHESES; h++) {
+            for (int i = 0; i < 2; i++) {
+                if (points[h][i] <= points[at][side]) { continue; }
+                at = h;
+                side = i;
+            }
         }
-        if (points[1] > most) {
-            most = points[1];
-            best = (evs_vec3_t){-v.x, -v.y, -v.z};
+        if ((k > 0u) && (points[at][side] == 0u)) { return k; }
+        const int32_t sign = (side == 0) ? 65536 : -65536;
+        const evs_vec3_t v = {HEMISPHERE[at][0] * sign, HEMISPHERE[at][1] * sign, HEMISPHERE[at][2] * sign};
+        if (evs_vec3_normalize(v, &best[k]) != EVS_OK) { best[k] = v; } /* the table is rounded to 14 bits */
+        for (int h = 0; h < N_HYPOTHESES; h++) {
+            const int32_t cosine_q28 = dot_q28(HEMISPHERE[h], HEMISPHERE[at]);
+            if (cosine_q28 > APART_Q28) { points[h][side] = 0u; }
+            if (cosine_q28 < -APART_Q28) { points[h][1 - side] = 0u; }
         }
     }
-    evs_vec3_t unit = best; /* the table is rounded to 14 bits */
-    return (evs_vec3_normalize(best, &unit) == EVS_OK) ? unit : best;
+    return EVS_EGO_CANDIDATES;
 }

@@ -38,9 +38,9 @@ extern "C" {
 #define EVS_EGOMOTION_N_MAX 65535u /**< Most flow vectors of one call. */
 
 /** Scratch of evs_egomotion_solve() for up to n vectors; aligned to 4 bytes. */
-#define EVS_EGOMOTION_BYTES(n) (1024u + (size_t)(n)*10u)
+#define EVS_EGOMOTION_BYTES(n) (1536u + (size_t)(n)*10u)
 /** The same for the methods PAPER and ERL. */
-#define EVS_EGOMOTION_PAPER_BYTES(n) (1024u + (size_t)(n)*16u)
+#define EVS_EGOMOTION_PAPER_BYTES(n) (1536u + (size_t)(n)*16u)
 
 /** One flow vector. Positions off [-8, 8) are left out and counted; any displacement will do. */
 typedef struct {
