@@ -9,8 +9,9 @@
 enum {
     WIDE_STEPS = 2,   /* from the hypothesis to where the noise can be judged */
     NARROW_STEPS = 4, /* the noise is judged again after two of them */
-    LONGER = 12,      /* eighths: the weights fall off, so that the plain step is too short */
-    SCALE_MIN = 20,   /* steps: 2 % of the median flow, what 16 bits resolve without loss */
+    LONGER = 12,
+    /* eighths: the weights fall off, so that the plain step is too short */
+    SCALE_MIN = 20, /* steps: 2 % of the median flow, what 16 bits resolve without loss */
     SCALE_MAX = 1 << EVS_EGO_MEDIAN_BITS,
     SCALE_WIDE = SCALE_MAX / 2,
     NOISE_VECTORS = 256, /* enough to choose a scale by */
@@ -102,10 +103,11 @@ static evs_scaled_t judge_count(const evs_ego_set_t *set, evs_egomotion_result_t
     const evs_ego_dir_t dir = evs_ego_dir(set, result->v_q30);
     const uint32_t limit = result->inlier_limit_;
     uint64_t chance_q16 = 0u;
+    const uint32_t each = (set->n > EVS_EGO_SUBSET) ? 4u : 1u; /* chance is summed up of a quarter of many */
     uint32_t n_against = 0u;
     for (uint32_t i = 0u; i < set->n; i++) {
         const evs_ego_view_t w = evs_ego_view(&set->vec[i], dir);
-        chance_q16 += by_chance_q16(about_length(&set->vec[i]), limit);
+        if (i % each == 0u) { chance_q16 += by_chance_q16(about_length(&set->vec[i]), limit); }
         const uint32_t cell = evs_ego_cell(set, &set->vec[i]);
         cells.n_all[cell]++;
         if (!is_near_line(&w, limit)) { continue; }
@@ -113,6 +115,7 @@ static evs_scaled_t judge_count(const evs_ego_set_t *set, evs_egomotion_result_t
         result->n_inliers += (w.d > 0) ? 1u : 0u;
         n_against += (w.d < 0) ? 1u : 0u;
     }
+    chance_q16 *= each;
     if (result->n_inliers < EVS_EGOMOTION_INLIERS_MIN) { result->flags |= EVS_EGOMOTION_FEW; }
     if (within(result->n_inliers, chance_q16, 4u)) { result->flags |= EVS_EGOMOTION_CHANCE; }
     /* tossed coins differ by more than three times the root of their number once in 400 throws */
@@ -151,7 +154,7 @@ static judgement_t judge(const evs_ego_set_t *set, evs_egomotion_result_t *resul
 
 /* Covariance of the tangent plane in rad^2, or NULL for none, to the camera's axes, and sigma. */
 static void put_spread(const evs_egomotion_config_t *cfg, const judgement_t *judgement, evs_scaled_t *cov,
-                       evs_egomotion_result_t *result)
+                       const evs_ego_frame_t *f, evs_egomotion_result_t *result)
 {
     if (cov == NULL) {
         result->flags |= EVS_EGOMOTION_DEGENERATE;
@@ -159,8 +162,8 @@ static void put_spread(const evs_egomotion_config_t *cfg, const judgement_t *jud
     }
     /* few vectors fit themselves better than they fit the truth; and where outliers come in patches, more of the same
      * are likely among the good ones: the root is between ignoring that and believing it of all */
-    const int64_t n = (result->n_inliers > 8u) ? result->n_inliers : 8;
-    const evs_scaled_t few = evs_scaled_div(evs_scaled(n * cfg->variance_factor_q8, -8), evs_scaled(n - 7, 0));
+    const int64_t n = (result->n_inliers > 9u) ? result->n_inliers : 9;
+    const evs_scaled_t few = evs_scaled_div(evs_scaled(n * cfg->variance_factor_q8, -8), evs_scaled(n - 8, 0));
     evs_scaled_t factor = evs_scaled_mul(few, evs_scaled_sqrt(judgement->patchiness));
     /* and halves of the image that contradict each other say that some of the good vectors are not */
     const evs_scaled_t var = evs_scaled_mul(evs_scaled_add(cov[0], cov[2]), factor);
@@ -172,7 +175,6 @@ static void put_spread(const evs_egomotion_config_t *cfg, const judgement_t *jud
     /* flow is rounded, and equal vectors are alike: that does not average out */
     cov[0] = evs_scaled_add(cov[0], evs_scaled(1, -24));
     cov[2] = evs_scaled_add(cov[2], evs_scaled(1, -24));
-    const evs_ego_frame_t f = evs_ego_frame(result->v_q30);
     const evs_scaled_t sigma = evs_scaled_sqrt(evs_scaled_add(cov[0], cov[2]));
     const int32_t sigma_q28 = evs_scaled_to_q(sigma, 28);
     if (sigma_q28 > SIGMA_MAX_Q28) {
@@ -180,8 +182,8 @@ static void put_spread(const evs_egomotion_config_t *cfg, const judgement_t *jud
         return;
     }
     result->sigma_rad_q28 = sigma_q28;
-    const int32_t b0[3] = {f.b0.x, f.b0.y, f.b0.z};
-    const int32_t b1[3] = {f.b1.x, f.b1.y, f.b1.z};
+    const int32_t b0[3] = {f->b0.x, f->b0.y, f->b0.z};
+    const int32_t b1[3] = {f->b1.x, f->b1.y, f->b1.z};
     const int32_t c00 = evs_scaled_to_q(cov[0], 30);
     const int32_t c01 = evs_scaled_to_q(cov[1], 30);
     const int32_t c11 = evs_scaled_to_q(cov[2], 30);
@@ -211,14 +213,14 @@ static uint32_t kernel_scale(uint32_t noise)
 }
 
 /* The narrow steps with the rotation: it is taken out of the flow anew after each. */
-static uint32_t refine_rotation(const evs_egomotion_config_t *cfg, const evs_ego_call_t *call, evs_vec3_t *v,
-                                evs_ego_rotation_t *rot, evs_egomotion_result_t *result)
+static uint32_t refine_rotation(const evs_egomotion_config_t *cfg, const evs_ego_call_t *call, uint32_t noise,
+                                evs_vec3_t *v, evs_ego_rotation_t *rot, evs_egomotion_result_t *result)
 {
     const uint32_t fewer = (call->set.n + NOISE_VECTORS - 1u) / NOISE_VECTORS;
     uint32_t s = SCALE_WIDE;
     for (int i = 0; i < NARROW_STEPS; i++) {
+        if (i == 2) { noise = evs_ego_noise(&call->set, *v, NOISE_VECTORS); }
         if ((i & 1) == 0) {
-            const uint32_t noise = evs_ego_noise(&call->set, *v, NOISE_VECTORS);
             s = kernel_scale(noise);
             rot->prior = evs_ego_rotation_prior(&call->set, result, noise, cfg->rotation_sigma_rad_q28);
         }
@@ -232,7 +234,7 @@ static uint32_t refine_rotation(const evs_egomotion_config_t *cfg, const evs_ego
 /* Where to refine from. The best of the hypotheses need not lie in the basin of the best answer: a direction that
  * explains some of the scene and some of an object that moves by itself may fit more vectors roughly, but fewer well. So
  * a few are led to where their minimum shows, and compared at the scale of the noise. */
-static evs_vec3_t start(const evs_ego_set_t *set)
+static evs_vec3_t start(const evs_ego_set_t *set, uint32_t *noise_found)
 {
     const uint32_t some = (set->n + EVS_EGO_SUBSET - 1u) / EVS_EGO_SUBSET;
     evs_vec3_t v[EVS_EGO_CANDIDATES];
@@ -240,7 +242,7 @@ static evs_vec3_t start(const evs_ego_set_t *set)
     uint32_t noise = UINT32_MAX;
     for (uint32_t k = 0u; k < n; k++) {
         for (int i = 0; i < WIDE_STEPS; i++) { (void)evs_ego_step(set, SCALE_WIDE, some, 8, &v[k]); }
-        const uint32_t noise_here = evs_ego_noise(set, v[k], NOISE_VECTORS);
+        const uint32_t noise_here = evs_ego_noise(set, v[k], EVS_EGO_SUBSET);
         if (noise_here < noise) { noise = noise_here; }
     }
     uint32_t best = 0u;
@@ -248,12 +250,13 @@ static evs_vec3_t start(const evs_ego_set_t *set)
     for (uint32_t k = 0u; k < n; k++) {
         (void)evs_ego_step(set, kernel_scale(noise), some, 8, &v[k]);
         const uint32_t scale = (uint32_t)evs_clamp((int32_t)noise, SCALE_MIN, SCALE_MAX);
-        const uint32_t explained = evs_ego_explained(set, v[k], scale, NOISE_VECTORS);
+        const uint32_t explained = evs_ego_explained(set, v[k], scale, EVS_EGO_SUBSET);
         if (explained > most) {
             best = k;
             most = explained;
         }
     }
+    *noise_found = noise;
     return v[best];
 }
 
@@ -263,24 +266,34 @@ static void solve_robust(const evs_egomotion_config_t *cfg, const evs_ego_call_t
     const bool with_rotation = cfg->rotation_sigma_rad_q28 > 0;
     evs_ego_rotation_t rot = {{0, 0, 0}, {0, 0}};
     uint32_t s = SCALE_WIDE;
-    evs_vec3_t v = start(set);
+    uint32_t noise;
+    evs_vec3_t v = start(set, &noise);
+    evs_ego_frame_t f;
+    evs_scaled_t cov[4];
+    bool definite = true;
     if (with_rotation) {
-        s = refine_rotation(cfg, call, &v, &rot, result);
+        s = refine_rotation(cfg, call, noise, &v, &rot, result);
+        f = evs_ego_frame(v);
     } else {
-        const uint32_t fewer = (set->n + NOISE_VECTORS - 1u) / NOISE_VECTORS;
-        for (int i = 0; i < NARROW_STEPS; i++) {
-            if ((i & 1) == 0) { s = kernel_scale(evs_ego_noise(set, v, NOISE_VECTORS)); }
-            (void)evs_ego_step(set, s, (i < 2) ? fewer : 1u, LONGER, &v); /* what the later ones correct costs half */
+        /* what the later steps correct costs less */
+        const uint32_t stride[NARROW_STEPS - 1] = {(set->n + EVS_EGO_SUBSET - 1u) / EVS_EGO_SUBSET,
+                                                   (set->n + NOISE_VECTORS - 1u) / NOISE_VECTORS, 1u};
+        for (int i = 0; i < NARROW_STEPS - 1; i++) {
+            if (i == 2) { noise = evs_ego_noise(set, v, NOISE_VECTORS); }
+            s = kernel_scale(noise);
+            (void)evs_ego_step(set, s, stride[i], LONGER, &v);
         }
+        f = evs_ego_frame(v);
+        evs_scaled_t step[2];
+        definite = evs_ego_covariance(set, &f, s, cov, step); /* the last step comes along with it */
+        if (definite) { v = evs_ego_move(&f, step[0], step[1]); }
+        f = evs_ego_carry(&f, v);
     }
     result->v_q30 = v;
     const judgement_t j = judge(set, result);
     if (evs_ego_is_rotation(set, v, s)) { result->flags |= EVS_EGOMOTION_ROTATION; }
-    const evs_ego_frame_t f = evs_ego_frame(v);
-    evs_scaled_t cov[4];
-    const bool definite = with_rotation ? evs_ego_covariance_rotation(set, &f, s, j.noise, rot.prior, cov)
-                                        : evs_ego_covariance(set, &f, s, cov);
-    put_spread(cfg, &j, definite ? cov : NULL, result);
+    if (with_rotation) { definite = evs_ego_covariance_rotation(set, &f, s, j.noise, rot.prior, cov); }
+    put_spread(cfg, &j, definite ? cov : NULL, &f, result);
 }
 
 /* --- the published estimates ------------------------------------------------------------------------------------ */
@@ -296,7 +309,8 @@ static void solve_paper(const evs_egomotion_config_t *cfg, const evs_ego_call_t 
     if (!joint && evs_ego_is_rotation(set, result->v_q30, kernel_scale(j.noise))) {
         result->flags |= EVS_EGOMOTION_ROTATION;
     }
-    put_spread(cfg, &j, definite ? cov : NULL, result);
+    const evs_ego_frame_t f = evs_ego_frame(result->v_q30);
+    put_spread(cfg, &j, definite ? cov : NULL, &f, result);
 }
 
 /* --- the call --------------------------------------------------------------------------------------------------- */

@@ -18,6 +18,13 @@
 #include "evs/egomotion.h"
 #include "evs_scaled.h"
 
+/* Short loops over the unknowns: unrolled, their sums stay out of arrays. */
+#if defined(__GNUC__) && !defined(__clang__)
+#define EVS_EGO_UNROLL _Pragma("GCC unroll 5")
+#else
+#define EVS_EGO_UNROLL
+#endif
+
 enum {
     EVS_EGO_MEDIAN_BITS = 10, /* median flow length: 2^10 steps */
     EVS_EGO_CLIP = 8 << EVS_EGO_MEDIAN_BITS,
@@ -213,10 +220,14 @@ typedef struct {
     int32_t k1;
     int32_t wr_q2;    /* w r / |a| */
     int32_t bend_q15; /* psi' / w = 4 q - 3, q being the share whose square is w */
+} evs_ego_pull_t;
+
+/* And what the part of a rotation is made from. */
+typedef struct {
     evs_ego_view_t view;
     uint32_t weight_q30;
     uint32_t inv;
-} evs_ego_pull_t;
+} evs_ego_pull_more_t;
 
 /* psi' / w of a part of the Hessian. */
 static inline int32_t evs_ego_bend(const evs_ego_pull_t *a, int32_t k)
@@ -224,9 +235,9 @@ static inline int32_t evs_ego_bend(const evs_ego_pull_t *a, int32_t k)
     return evs_mul_hi(k * 8, a->bend_q15 * 16384);
 }
 
-/* False: the vector points the wrong way or is too close to the focus. */
+/* False: the vector points the wrong way or is too close to the focus. `more` may be NULL. */
 static inline bool evs_ego_pull(const evs_ego_set_t *set, const evs_ego_vector_t *p, const evs_ego_loop_t *loop,
-                                evs_ego_pull_t *out)
+                                evs_ego_pull_t *out, evs_ego_pull_more_t *more)
 {
     const evs_ego_view_t w = evs_ego_view(p, loop->v);
     if ((w.d <= 0) || evs_ego_near_focus(set, &w)) { return false; }
@@ -238,9 +249,7 @@ static inline bool evs_ego_pull(const evs_ego_set_t *set, const evs_ego_vector_t
     out->k1 = evs_ego_weigh(weight_q30, inv, out->j.j1);
     out->wr_q2 = evs_mul_hi((int32_t)weight_q30, evs_ego_over_a2_q2(set, w.c, inv) * 4);
     out->bend_q15 = 4 * (int32_t)share - 3 * 32768;
-    out->view = w;
-    out->weight_q30 = weight_q30;
-    out->inv = inv;
+    if (more != NULL) { *more = (evs_ego_pull_more_t){w, weight_q30, inv}; }
     return true;
 }
 
@@ -281,6 +290,7 @@ static inline void evs_ego_left_over(const evs_ego_set_t *set, const evs_ego_vec
     const unsigned shift = set->one_bits + 9u;
     int64_t u = 0;
     int64_t v = 0;
+    EVS_EGO_UNROLL
     for (unsigned k = 0u; k < 3u; k++) {
         u += (int64_t)r->bu[k] * t->w_q8[k];
         v += (int64_t)r->bv[k] * t->w_q8[k];
@@ -300,6 +310,13 @@ void evs_ego_repack(const evs_ego_set_t *set, const evs_egomotion_flow_t *flow, 
 bool evs_ego_pack_one(const evs_egomotion_result_t *scale, const evs_egomotion_flow_t *flow, evs_ego_vector_t *packed);
 /* Steps to K^-1 px, Q24. */
 uint32_t evs_ego_steps_to_q24(const evs_egomotion_result_t *scale, uint32_t steps);
+/* evs_ego_key() of a small number. */
+static inline uint16_t evs_ego_key32(uint32_t x)
+{
+    if (x < 1024u) { return (uint16_t)x; }
+    const unsigned shift = 21u - evs_clz32(x);
+    return (uint16_t)((shift << 10) + (x >> shift));
+}
 /* A 16-bit key in the order of x; relative resolution 2^-10. And the middle of the values with that key. */
 uint16_t evs_ego_key(uint64_t x);
 uint64_t evs_ego_key_value(uint16_t key);
@@ -315,6 +332,8 @@ uint32_t evs_ego_search(const evs_ego_set_t *set, evs_vec3_t best[EVS_EGO_CANDID
 /* --- evs_egomotion_refine.c --- */
 
 evs_ego_frame_t evs_ego_frame(evs_vec3_t v_q30);
+/* The same frame at a v near by. */
+evs_ego_frame_t evs_ego_carry(const evs_ego_frame_t *f, evs_vec3_t v_q30);
 /* Move along the tangent plane by (d0, d1), at most half a radian, and normalize. */
 evs_vec3_t evs_ego_move(const evs_ego_frame_t *f, evs_scaled_t d0, evs_scaled_t d1);
 /* A Gauss-Newton step, made longer by eighths / 8, with Geman-McClure weights of scale s on every stride-th vector.
@@ -325,10 +344,11 @@ uint32_t evs_ego_noise(const evs_ego_set_t *set, evs_vec3_t v_q30, uint32_t n_ma
 /* How well v explains at most n_max of the vectors: the sum of their weights, Q15. */
 uint32_t evs_ego_explained(const evs_ego_set_t *set, evs_vec3_t v_q30, uint32_t s, uint32_t n_max);
 /* Sandwich covariance of v under the kernel of scale s in the tangent plane: 00, 01, 11, rad^2; then what
- * evs_ego_halves_apart() says. False: not positive definite. */
-bool evs_ego_covariance(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint32_t s, evs_scaled_t cov[4]);
+ * evs_ego_halves_apart() says; and the step that these sums tell to take. False: not positive definite. */
+bool evs_ego_covariance(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint32_t s, evs_scaled_t cov[4],
+                        evs_scaled_t step[2]);
 /* The first two rows and columns of H^-1 M H^-1, as above; lower triangles by rows. False: H is singular. */
-bool evs_ego_sandwich(const evs_scaled_t *h, const evs_scaled_t *m, unsigned dim, evs_scaled_t cov[4]);
+bool evs_ego_sandwich(const evs_scaled_t *h, const evs_scaled_t *m, unsigned dim, evs_scaled_t cov[3]);
 
 /* What one cell adds to the Hessian of v, and to the gradient in 4 steps^2. */
 typedef struct {

@@ -29,6 +29,14 @@ evs_ego_frame_t evs_ego_frame(evs_vec3_t v)
     return f;
 }
 
+evs_ego_frame_t evs_ego_carry(const evs_ego_frame_t *f, evs_vec3_t v)
+{
+    evs_ego_frame_t g = {v, f->b0, f->b1};
+    g.b1 = unit_or(evs_vec3_cross(v, f->b0, 30u), f->b1);
+    g.b0 = evs_vec3_cross(g.b1, v, 30u);
+    return g;
+}
+
 /* Half a radian at most, Q30: far steps of a linear model mean nothing. */
 #define STEP_MAX_Q30 (INT32_C(1) << 29)
 
@@ -61,7 +69,7 @@ bool evs_ego_step(const evs_ego_set_t *set, uint32_t s, uint32_t stride, int32_t
     int64_t g0_q2 = 0, g1_q2 = 0;      /* sum of w r J: the gradient */
     for (uint32_t i = 0u; i < set->n; i += stride) {
         evs_ego_pull_t a;
-        if (!evs_ego_pull(set, &set->vec[i], &loop, &a)) { continue; }
+        if (!evs_ego_pull(set, &set->vec[i], &loop, &a, NULL)) { continue; }
         h00 += (int64_t)a.k0 * a.j.j0;
         h01 += (int64_t)a.k0 * a.j.j1;
         h11 += (int64_t)a.k1 * a.j.j1;
@@ -85,7 +93,8 @@ uint32_t evs_ego_noise(const evs_ego_set_t *set, evs_vec3_t v_q30, uint32_t n_ma
         const evs_ego_view_t w = evs_ego_view(&set->vec[i], dir);
         if (evs_ego_near_focus(set, &w)) { continue; }
         const int32_t r_per_a_q2 = evs_ego_over_a2_q2(set, w.c, evs_ego_inv_a2(set, w.a2));
-        set->key[m++] = evs_ego_key((uint64_t)((int64_t)w.c * r_per_a_q2) >> (set->one_bits - 2u)); /* 16 r^2 */
+        const uint64_t r2_q4 = (uint64_t)((int64_t)w.c * r_per_a_q2) >> (set->one_bits - 2u); /* below 2^31 */
+        set->key[m++] = evs_ego_key32((uint32_t)r2_q4);
     }
     if (m == 0u) { return EVS_EGO_CLIP; }
     /* The lower quartile instead of the median: |r| of a normal distribution lies below 0.3186 sigma for a quarter.
@@ -200,16 +209,17 @@ bool evs_ego_sandwich(const evs_scaled_t *h, const evs_scaled_t *m, unsigned dim
     return true;
 }
 
-bool evs_ego_covariance(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint32_t s, evs_scaled_t cov[4])
+bool evs_ego_covariance(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint32_t s, evs_scaled_t cov[4],
+                        evs_scaled_t step[2])
 {
     const evs_ego_loop_t loop = evs_ego_loop(set, f, s);
-    int64_t total[3] = {0, 0, 0};
+    evs_ego_cell_sum_t total = {{0}, {0}};
     int64_t curvature = 0; /* sum of psi' |J|^2: the trace of the true Hessian */
     uint64_t spread = 0u;  /* sum of the squares of the gradient, vector by vector */
     evs_ego_cell_sum_t *const cells = evs_ego_cells(set);
     for (uint32_t i = 0u; i < set->n; i++) {
         evs_ego_pull_t a;
-        if (!evs_ego_pull(set, &set->vec[i], &loop, &a)) { continue; }
+        if (!evs_ego_pull(set, &set->vec[i], &loop, &a, NULL)) { continue; }
         evs_ego_cell_sum_t *const cell = &cells[evs_ego_cell(set, &set->vec[i])];
         cell->h[0] += (int64_t)a.k0 * a.j.j0;
         cell->h[1] += (int64_t)a.k0 * a.j.j1;
@@ -223,14 +233,17 @@ bool evs_ego_covariance(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint
     }
     if (curvature <= 0) { return false; }
     for (unsigned c = 0u; c < EVS_EGO_CELLS; c++) {
-        for (unsigned i = 0u; i < 3u; i++) { total[i] += cells[c].h[i]; }
+        for (unsigned i = 0u; i < 3u; i++) { total.h[i] += cells[c].h[i]; }
+        for (unsigned i = 0u; i < 2u; i++) { total.z[i] += cells[c].z[i]; }
     }
     /* cov = H^-1 M H^-1 / kappa^2, kappa being the trace of the true Hessian over that of H: the true one by itself
      * need not be positive, and its inverse would be noise. */
-    const evs_scaled_t kappa = evs_scaled_div(evs_scaled(curvature, 0), evs_scaled(total[0] + total[2], 0));
-    const evs_scaled_t h[3] = {evs_scaled_mul(evs_scaled(total[0], 0), kappa),
-                               evs_scaled_mul(evs_scaled(total[1], 0), kappa),
-                               evs_scaled_mul(evs_scaled(total[2], 0), kappa)};
+    const evs_scaled_t kappa = evs_scaled_div(evs_scaled(curvature, 0), evs_scaled(total.h[0] + total.h[2], 0));
+    evs_scaled_t h[3];
+    evs_scaled_t factors[3];
+    for (unsigned i = 0u; i < 3u; i++) { factors[i] = h[i] = evs_scaled_mul(evs_scaled(total.h[i], 0), kappa); }
+    for (unsigned i = 0u; i < 2u; i++) { step[i] = evs_scaled(-total.z[i], 2); }
+    if (!evs_scaled_solve(factors, step, 2u)) { return false; }
     evs_scaled_t m[3];
     evs_ego_spread(cells, 2u, m);
     cov[3] = evs_ego_halves_apart(cells, kappa);

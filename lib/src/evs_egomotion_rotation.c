@@ -27,18 +27,22 @@ static void add_up(const evs_ego_set_t *set, const evs_ego_frame_t *f, uint32_t 
     for (uint32_t i = 0u; i < set->n; i += stride) {
         const evs_ego_vector_t *const p = &set->vec[i];
         evs_ego_pull_t a;
-        if (!evs_ego_pull(set, p, &loop, &a)) { continue; }
+        evs_ego_pull_more_t more;
+        if (!evs_ego_pull(set, p, &loop, &a, &more)) { continue; }
         const evs_ego_rows_t rows = evs_ego_rows(set, p);
         int32_t j[DIM] = {a.j.j0, a.j.j1, 0, 0, 0};
+        EVS_EGO_UNROLL
         for (unsigned k = 0u; k < 3u; k++) {
             const int64_t across =
-                ((int64_t)rows.bv[k] * a.view.ax - (int64_t)rows.bu[k] * a.view.ay) >> (set->one_bits + 1u);
+                ((int64_t)rows.bv[k] * more.view.ax - (int64_t)rows.bu[k] * more.view.ay) >> (set->one_bits + 1u);
             j[2u + k] = evs_clamp(evs_sat32(across), -SLOPE_MAX, SLOPE_MAX);
         }
         unsigned at = 0u;
+        EVS_EGO_UNROLL
         for (unsigned k = 0u; k < DIM; k++) {
-            const int32_t wj = (k == 0u) ? a.k0 : ((k == 1u) ? a.k1 : evs_ego_weigh(a.weight_q30, a.inv, j[k]));
+            const int32_t wj = (k == 0u) ? a.k0 : ((k == 1u) ? a.k1 : evs_ego_weigh(more.weight_q30, more.inv, j[k]));
             sums->g_q2[k] += (int64_t)a.wr_q2 * j[k];
+            EVS_EGO_UNROLL
             for (unsigned l = 0u; l <= k; l++) { sums->h[at++] += (int64_t)wj * j[l]; }
         }
         if (spread == NULL) { continue; }
@@ -139,10 +143,12 @@ static bool fit_turn(const evs_ego_set_t *set, uint32_t stride, uint32_t s2, evs
         const uint32_t share = ratio_q15(s2, s2 + (e >> 1));
         const int32_t weight_q8 = (int32_t)((share * share) >> 22);
         unsigned at = 0u;
+        EVS_EGO_UNROLL
         for (unsigned k = 0u; k < 3u; k++) { /* slopes below 2^18: sums below 2^(36 + 1 + 16) */
             const int32_t wu = (r.bu[k] * weight_q8) >> 8;
             const int32_t wv = (r.bv[k] * weight_q8) >> 8;
             g[k] += (int64_t)wu * left[0] + (int64_t)wv * left[1];
+            EVS_EGO_UNROLL
             for (unsigned l = 0u; l <= k; l++) { h[at++] += (int64_t)wu * r.bu[l] + (int64_t)wv * r.bv[l]; }
         }
     }
@@ -158,75 +164,78 @@ static bool fit_turn(const evs_ego_set_t *set, uint32_t stride, uint32_t s2, evs
     return true;
 }
 
-/* Fit a turn to every stride-th vector, at the scales of the median flow, half of it, and twice s. The first three look
- * at 128 of them at most. */
+/* Fit a turn to some of the vectors, at the scales of the median flow, half of it, and twice s. */
 static bool find_turn(const evs_ego_set_t *set, uint32_t stride, uint32_t s, evs_ego_turn_t *t)
 {
-    const uint32_t some = (set->n + EVS_EGO_SUBSET - 1u) / EVS_EGO_SUBSET;
     for (unsigned i = 0u; i < 4u; i++) {
         const uint32_t wide = (UINT32_C(1) << EVS_EGO_MEDIAN_BITS) >> i;
         const uint32_t scale = ((i < 2u) && (wide > s)) ? wide : s;
-        if (!fit_turn(set, ((i < 3u) && (some > stride)) ? some : stride, scale * scale, t)) { return false; }
+        if (!fit_turn(set, stride, scale * scale, t)) { return false; }
     }
     return true;
 }
 
-/* The share of the vectors that an explanation explains is estimated from the sum of s^2 / (s^2 + r^2): less what a
+/* The share of the vectors that an explanation explains is estimated from the mean of s^2 / (s^2 + r^2): less what a
  * vector of its length and a random direction would give on average, over what a good one would give less the same. */
 typedef struct {
-    int64_t got;
-    int64_t possible;
+    uint32_t got;    /* sums */
+    uint32_t chance; /* this one over fewer of them */
 } explained_t;
 
 enum { GOOD_Q15 = 27200 }; /* 0.83: the mean of s^2 / (s^2 + r^2) for normal r of half the scale s */
 
-static void explain(explained_t *x, uint32_t share, uint32_t by_chance)
+static evs_scaled_t share_of(const explained_t *x, uint32_t n, uint32_t n_chance)
 {
-    x->got += (int64_t)share - (int64_t)by_chance;
-    x->possible += (int64_t)GOOD_Q15 - (int64_t)by_chance;
+    const int64_t by_chance = (int64_t)x->chance * n / n_chance;
+    return evs_scaled_div(evs_scaled(x->got - by_chance, 0), evs_scaled((int64_t)GOOD_Q15 * n - by_chance + 1, 0));
 }
 
-/* By how much v explains more of the vectors than a turn does, Q15. */
-static int32_t lead_over_turn(const evs_ego_set_t *set, uint32_t stride, evs_vec3_t v_q30, uint32_t s)
+/* By how much v explains more of the vectors than a turn does, Q15. Of at most 1024 vectors. */
+static int32_t lead_over_turn(const evs_ego_set_t *set, uint32_t stride, evs_vec3_t v_q30, uint32_t s,
+                              const evs_ego_turn_t *t)
 {
-    evs_ego_turn_t t = {{0, 0, 0}};
-    if (!find_turn(set, stride, s, &t)) { return INT32_MAX; }
     const evs_ego_dir_t dir = evs_ego_dir(set, v_q30);
     const evs_ego_scale_t kernel = evs_ego_scale(s);
     const uint32_t s2 = s * s;
-    explained_t by_v = {0, 1};
-    explained_t by_turn = {0, 1};
-    for (uint32_t i = 0u; i < set->n; i += stride) {
+    const uint32_t each = (set->n > EVS_EGO_SUBSET) ? 4u : 1u; /* chance needs no more than a quarter of many */
+    explained_t by_v = {0u, 0u};
+    explained_t by_turn = {0u, 0u};
+    uint32_t n = 0u;
+    uint32_t n_chance = 0u;
+    for (uint32_t i = 0u; i < set->n; i += stride, n++) {
         const evs_ego_vector_t *const p = &set->vec[i];
         const evs_ego_view_t w = evs_ego_view(p, dir);
         const evs_ego_rows_t r = evs_ego_rows(set, p);
         int32_t left[2];
-        evs_ego_left_over(set, p, &r, &t, left);
-        const int32_t turned[2] = {p->u - left[0], p->v - left[1]};
+        evs_ego_left_over(set, p, &r, t, left);
         const uint32_t e = (uint32_t)(left[0] * left[0]) + (uint32_t)(left[1] * left[1]);
+        by_v.got += (w.d > 0) ? evs_ego_share_q15(kernel, &w) : 0u;
+        by_turn.got += ratio_q15(s2, s2 + (e >> 1));
+        if (n % each != 0u) { continue; }
+        const int32_t turned[2] = {p->u - left[0], p->v - left[1]};
         const uint64_t u2 = (uint64_t)(p->u * p->u + p->v * p->v);
         const uint64_t b2 = (uint64_t)((int64_t)turned[0] * turned[0] + (int64_t)turned[1] * turned[1]);
         /* the mean over the direction of u: s / sqrt(s^2 + u^2) and, in two dimensions, s^2 / sqrt(a^2 - u^2 b^2) */
         const uint64_t a = s2 + ((u2 + b2) >> 1);
-        const uint32_t chance_v = ratio_q15(s, evs_sqrt_u64(s2 + u2)) / 2u; /* and half point the wrong way */
-        const uint32_t chance_turn = ratio_q15(s2, evs_sqrt_u64(a * a - u2 * b2));
-        explain(&by_v, (w.d > 0) ? evs_ego_share_q15(kernel, &w) : 0u, chance_v);
-        explain(&by_turn, ratio_q15(s2, s2 + (e >> 1)), chance_turn);
+        by_v.chance += ratio_q15(s, evs_sqrt_u64(s2 + u2)) / 2u; /* and half point the wrong way */
+        by_turn.chance += ratio_q15(s2, evs_sqrt_u64(a * a - u2 * b2));
+        n_chance++;
     }
-    const evs_scaled_t lead =
-        evs_scaled_sub(evs_scaled_div(evs_scaled(by_v.got, 0), evs_scaled(by_v.possible, 0)),
-                       evs_scaled_div(evs_scaled(by_turn.got, 0), evs_scaled(by_turn.possible, 0)));
-    return evs_scaled_to_q(lead, 15);
+    return evs_scaled_to_q(evs_scaled_sub(share_of(&by_v, n, n_chance), share_of(&by_turn, n, n_chance)), 15);
 }
 
 bool evs_ego_is_rotation(const evs_ego_set_t *set, evs_vec3_t v_q30, uint32_t s)
 {
     enum { CLEAR_Q15 = 10000, FEW = 64, MORE = 512 }; /* a lead of 0.3 needs no second look */
     const uint32_t coarse = (set->n + FEW - 1u) / FEW;
-    if ((set->n > FEW) && (lead_over_turn(set, coarse, v_q30, s) > CLEAR_Q15)) { return false; }
-    const uint32_t stride = (set->n + MORE - 1u) / MORE;
+    const uint32_t fine = (set->n + MORE - 1u) / MORE;
+    const uint32_t half = (set->n + MORE / 2u - 1u) / (MORE / 2u);
+    evs_ego_turn_t t = {{0, 0, 0}};
+    if (!find_turn(set, coarse, s, &t)) { return false; }
+    if ((coarse > 1u) && (lead_over_turn(set, coarse, v_q30, s, &t) > CLEAR_Q15)) { return false; }
+    if (!fit_turn(set, half, s * s, &t)) { return false; }
     /* for a pure rotation the lead is 0 with a deviation of about 0.45 / sqrt(n): half as much again */
     const int32_t limit =
-        (int32_t)(((INT32_C(7) << 15) / 10) * 16 / (int32_t)evs_sqrt_u64((uint64_t)(set->n / stride) << 8));
-    return lead_over_turn(set, stride, v_q30, s) <= limit;
+        (int32_t)(((INT32_C(7) << 15) / 10) * 16 / (int32_t)evs_sqrt_u64((uint64_t)(set->n / fine) << 8));
+    return lead_over_turn(set, fine, v_q30, s, &t) <= limit;
 }

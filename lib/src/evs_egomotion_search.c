@@ -117,8 +117,8 @@ static void score(const evs_ego_wedge_t *w, uint32_t n, const int16_t v[3], uint
         not_forward += (uint32_t)(a | b) >> 31;
         backward += (uint32_t)(a & b) >> 31;
     }
-    points[0] = (uint8_t)(n - not_forward);
-    points[1] = (uint8_t)backward;
+    points[0] = (uint8_t)(points[0] + (n - not_forward));
+    points[1] = (uint8_t)(points[1] + backward);
 }
 
 enum { APART_Q28 = 243283000 }; /* the cosine of 25 degrees */
@@ -129,7 +129,21 @@ uint32_t evs_ego_search(const evs_ego_set_t *set, evs_vec3_t best[EVS_EGO_CANDID
 {
     const uint32_t n = pick(set);
     uint8_t points[N_HYPOTHESES][2];
-    for (int h = 0; h < N_HYPOTHESES; h++) { score(set->subset->wedge, n, HEMISPHERE[h], points[h]); }
+    const uint32_t half = (n + 1u) / 2u;
+    uint32_t most = 0u;
+    for (int h = 0; h < N_HYPOTHESES; h++) {
+        points[h][0] = 0u;
+        points[h][1] = 0u;
+        score(set->subset->wedge, half, HEMISPHERE[h], points[h]);
+        for (int i = 0; i < 2; i++) {
+            if (points[h][i] > most) { most = points[h][i]; }
+        }
+    }
+    for (int h = 0; h < N_HYPOTHESES; h++) { /* what is far behind half-way does not win */
+        if ((points[h][0] * 8u >= most * 5u) || (points[h][1] * 8u >= most * 5u)) {
+            score(set->subset->wedge + half, n - half, HEMISPHERE[h], points[h]);
+        }
+    }
     for (uint32_t k = 0u; k < EVS_EGO_CANDIDATES; k++) {
         int at = 0;
         int side = 0;
@@ -140,7 +154,8 @@ uint32_t evs_ego_search(const evs_ego_set_t *set, evs_vec3_t best[EVS_EGO_CANDID
                 side = i;
             }
         }
-        if ((k > 0u) && (points[at][side] == 0u)) { return k; }
+        if ((k > 0u) && (points[at][side] * 8u <= most * 5u)) { return k; }
+        if (k == 0u) { most = points[at][side]; }
         const int32_t sign = (side == 0) ? 65536 : -65536;
         const evs_vec3_t v = {HEMISPHERE[at][0] * sign, HEMISPHERE[at][1] * sign, HEMISPHERE[at][2] * sign};
         if (evs_vec3_normalize(v, &best[k]) != EVS_OK) { best[k] = v; } /* the table is rounded to 14 bits */

@@ -10,7 +10,7 @@
 
 #include <stdio.h>
 
-enum { N = 500, TRIALS = 200 };
+enum { N = 500, TRIALS = 200, MANY = 1500 };
 
 static evs_egomotion_flow_t flow[N];
 static model_flow_t flow_d[N];
@@ -18,7 +18,7 @@ static unsigned char bad[N];
 static uint64_t scratch[EVS_EGOMOTION_PAPER_BYTES(N) / 8u + 1u];
 static evs_egomotion_config_t cfg;
 static evs_egomotion_result_t result;
-static double errors[TRIALS];
+static double errors[MANY];
 static double honesty; /* RMS error over RMS sigma */
 
 void setUp(void)
@@ -144,6 +144,74 @@ static void test_few_vectors(void)
     int n_valid;
     TEST_ASSERT_TRUE(mean_error(&s, 0.0, 100, &n_valid) <= 2.5);
     TEST_ASSERT_TRUE(n_valid >= TRIALS * 97 / 100);
+}
+
+/* The cell with the least margin, in as many scenes as it takes to tell. */
+static void test_the_hardest_cell_in_many_scenes(void)
+{
+    const scene_settings_t s = scene_settings(1.0, 0.5);
+    double sum = 0.0;
+    for (int t = 0; t < MANY; t++) {
+        const scene_truth_t truth = make(&s, 0.0, N);
+        sum += solve(&truth, N);
+    }
+    (void)printf("1.0 px, 50 %%, %d scenes: mean %.3f\n", MANY, sum / MANY);
+    TEST_ASSERT_TRUE(sum / MANY <= 2.85);
+}
+
+/* Errors over sigma of the valid results, sorted; returns how many. */
+static int ratios(const scene_settings_t *s, bool object_varies, size_t n, int n_trials)
+{
+    scene_settings_t here = *s;
+    int m = 0;
+    for (int t = 0; t < n_trials; t++) {
+        if (object_varies) { /* a third to three times the speed, 1 to 4 m off */
+            here.object_way_m = 0.05 * pow(3.0, 2.0 * scene_uniform() - 1.0);
+            here.object_depth_m = 1.0 + 3.0 * scene_uniform();
+        }
+        const scene_truth_t truth = make(&here, 0.0, n);
+        const double error = solve(&truth, n);
+        if ((result.flags & (uint32_t)EVS_EGOMOTION_VALID) != 0u) { errors[m++] = error / scene_sigma_deg(&result); }
+    }
+    qsort(errors, (size_t)m, sizeof errors[0], by_size);
+    return m;
+}
+
+static int count_above(double limit, int m)
+{
+    int n = 0;
+    for (int i = 0; i < m; i++) { n += (errors[i] > limit) ? 1 : 0; }
+    return n;
+}
+
+static void test_an_object_of_any_speed_leaves_sigma_honest(void)
+{
+    enum { CASES = 1000, N_VECTORS = 300 };
+    scene_settings_t s = scene_settings(0.4, 0.0);
+    s.object_share = 0.3;
+    const int m = ratios(&s, true, N_VECTORS, CASES);
+    (void)printf("object over 30 %%: %d of %d valid, error over sigma: p68 %.2f, p95 %.2f, max %.1f, %d above 4\n", m,
+                 (int)CASES, errors[m * 68 / 100], errors[m * 95 / 100], errors[m - 1], count_above(4.0, m));
+    TEST_ASSERT_TRUE(m >= CASES * 97 / 100);
+    TEST_ASSERT_TRUE(errors[m * 95 / 100] <= 2.5);
+    TEST_ASSERT_TRUE(errors[m * 68 / 100] >= 0.4); /* not by a sigma that says nothing */
+    TEST_ASSERT_TRUE(count_above(4.0, m) <= CASES / 200);
+}
+
+static void test_few_vectors_leave_sigma_honest(void)
+{
+    enum { CASES = 1000 };
+    static const size_t N_VECTORS[] = {12, 20};
+    const scene_settings_t s = scene_settings(0.5, 0.0);
+    for (int k = 0; k < 2; k++) {
+        const int m = ratios(&s, false, N_VECTORS[k], CASES);
+        (void)printf("%2u vectors: %d of %d valid, error over sigma: p68 %.2f, p95 %.2f, %d above 4\n",
+                     (unsigned)N_VECTORS[k], m, (int)CASES, errors[m * 68 / 100], errors[m * 95 / 100],
+                     count_above(4.0, m));
+        TEST_ASSERT_TRUE(m >= CASES * 6 / 10);
+        TEST_ASSERT_TRUE(errors[m * 95 / 100] <= 2.5);
+        TEST_ASSERT_TRUE(errors[m * 68 / 100] >= 0.5);
+    }
 }
 
 static void test_residual_rotation(void)
@@ -333,6 +401,9 @@ int main(int argc, char **argv)
     RUN_TEST(test_goals_noise_05);
     RUN_TEST(test_goals_noise_10);
     RUN_TEST(test_few_vectors);
+    RUN_TEST(test_the_hardest_cell_in_many_scenes);
+    RUN_TEST(test_an_object_of_any_speed_leaves_sigma_honest);
+    RUN_TEST(test_few_vectors_leave_sigma_honest);
     RUN_TEST(test_residual_rotation);
     RUN_TEST(test_never_confident_and_wrong);
     RUN_TEST(test_long_lenses);

@@ -56,11 +56,12 @@ static void model_tangent(const double v[3], double t0[3], double t1[3])
 
 /* --- the robust estimator -------------------------------------------------------------------------------------- */
 
-/* A Gauss-Newton step; s = 0 weighs all alike, `use` (or NULL) tells which vectors count, d > 0 or not. */
+/* A Gauss-Newton step times `longer`, or by the trace of the true Hessian where that is 0; s = 0 weighs all alike,
+ * `bad` (or NULL) tells which vectors do not count, d > 0 or not. */
 static void model_step(const model_flow_t *f, size_t n, size_t stride, double s, double rho_max,
-                       const unsigned char *bad, double v[3])
+                       const unsigned char *bad, double longer, double v[3])
 {
-    double t0[3], t1[3], h00 = 0, h01 = 0, h11 = 0, g0 = 0, g1 = 0;
+    double t0[3], t1[3], h00 = 0, h01 = 0, h11 = 0, g0 = 0, g1 = 0, bent = 0;
     model_tangent(v, t0, t1);
     for (size_t i = 0; i < n; i += stride) {
         const double ax = f[i].x * v[2] - v[0];
@@ -79,21 +80,22 @@ static void model_step(const model_flow_t *f, size_t n, size_t stride, double s,
         h00 += w * j0 * j0;
         h01 += w * j0 * j1;
         h11 += w * j1 * j1;
+        bent += (4.0 * share - 3.0) * w * (j0 * j0 + j1 * j1);
         g0 += w * c * j0;
         g1 += w * c * j1;
     }
     const double det = h00 * h11 - h01 * h01;
+    if (longer <= 0.0) { longer = (bent > 0.0) ? (h00 + h11) / bent : 0.0; }
     if (!(det > 0.0)) { return; }
-    const double d0 = -(h11 * g0 - h01 * g1) / det;
-    const double d1 = -(h00 * g1 - h01 * g0) / det;
+    const double d0 = -longer * (h11 * g0 - h01 * g1) / det;
+    const double d1 = -longer * (h00 * g1 - h01 * g0) / det;
     for (int k = 0; k < 3; k++) { v[k] += fmax(-0.5, fmin(0.5, d0)) * t0[k] + fmax(-0.5, fmin(0.5, d1)) * t1[k]; }
     model_unit(v);
 }
 
 /* sigma from the lower quartile of |r| */
-static double model_noise(const model_flow_t *f, size_t n, const double v[3])
+static double model_noise(const model_flow_t *f, size_t n, size_t stride, const double v[3])
 {
-    const size_t stride = (n + 255u) / 256u;
     size_t m = 0;
     for (size_t i = 0; i < n; i += stride) {
         const double ax = f[i].x * v[2] - v[0];
@@ -104,36 +106,108 @@ static double model_noise(const model_flow_t *f, size_t n, const double v[3])
     return model_kth(m, m / 4u) / 0.31864;
 }
 
+/* Sum of the weights of Geman and McClure. */
+static double model_explained(const model_flow_t *f, size_t n, size_t stride, double s, const double v[3])
+{
+    double sum = 0.0;
+    for (size_t i = 0; i < n; i += stride) {
+        const double ax = f[i].x * v[2] - v[0];
+        const double ay = f[i].y * v[2] - v[1];
+        const double c = f[i].u * ay - f[i].v * ax;
+        const double share = s * s / (s * s + c * c / (ax * ax + ay * ay));
+        sum += (f[i].u * ax + f[i].v * ay > 0.0) ? share * share : 0.0;
+    }
+    return sum;
+}
+
+enum { MODEL_HYPOTHESES = 128, MODEL_CANDIDATES = 3 }; /* the second half of the hypotheses is the first, negated */
+
+static void model_hypothesis(int h, double q[3])
+{
+    const double z = 1.0 - (h % 64 + 0.5) / 64.0;
+    const double angle = (h % 64) * 3.14159265358979323846 * (3.0 - sqrt(5.0));
+    const double sign = (h < 64) ? 1.0 : -1.0;
+    q[0] = sign * sqrt(1.0 - z * z) * cos(angle);
+    q[1] = sign * sqrt(1.0 - z * z) * sin(angle);
+    q[2] = sign * z;
+}
+
+static int model_vote(const model_flow_t *f, size_t n, size_t from, size_t to, size_t m, double median,
+                      const double q[3])
+{
+    int votes = 0;
+    for (size_t k = from; k < to; k++) {
+        const model_flow_t *const p = &f[k * n / m];
+        const double ax = p->x * q[2] - q[0];
+        const double ay = p->y * q[2] - q[1];
+        const double c = p->u * ay - p->v * ax;
+        const bool near = c * c <= median * median / 8.0 * (ax * ax + ay * ay);
+        votes += (near && (p->u * ax + p->v * ay > 0.0)) ? 1 : 0;
+    }
+    return votes;
+}
+
 static void model_robust(const model_flow_t *f, size_t n, double v[3])
 {
     for (size_t i = 0; i < n; i++) { model_key[i] = hypot(f[i].u, f[i].v); }
     const double median = model_kth(n, n / 2u);
     const size_t m = (n < 128u) ? n : 128u;
-    size_t most = 0;
-    for (int h = 0; h < 64; h++) {
-        const double z = 1.0 - (h + 0.5) / 64.0;
-        const double angle = h * 3.14159265358979323846 * (3.0 - sqrt(5.0));
-        const double q[3] = {sqrt(1.0 - z * z) * cos(angle), sqrt(1.0 - z * z) * sin(angle), z};
-        size_t votes[2] = {0, 0};
-        for (size_t k = 0; k < m; k++) {
-            const model_flow_t *const p = &f[k * n / m];
-            const double ax = p->x * q[2] - q[0];
-            const double ay = p->y * q[2] - q[1];
-            const double c = p->u * ay - p->v * ax;
-            if (c * c <= median * median / 8.0 * (ax * ax + ay * ay)) { votes[p->u * ax + p->v * ay > 0.0]++; }
+    const size_t some = (n + 127u) / 128u;
+    int votes[MODEL_HYPOTHESES];
+    int most = 0;
+    for (int h = 0; h < MODEL_HYPOTHESES; h++) {
+        double q[3];
+        model_hypothesis(h, q);
+        votes[h] = model_vote(f, n, 0u, (m + 1u) / 2u, m, median, q);
+        if (votes[h] > most) { most = votes[h]; }
+    }
+    int first_half[MODEL_HYPOTHESES];
+    memcpy(first_half, votes, sizeof votes);
+    for (int h = 0; h < MODEL_HYPOTHESES; h++) {
+        const int other = (h + 64) % MODEL_HYPOTHESES;
+        double q[3];
+        model_hypothesis(h, q);
+        if ((8 * first_half[h] < 5 * most) && (8 * first_half[other] < 5 * most)) { continue; }
+        votes[h] += model_vote(f, n, (m + 1u) / 2u, m, m, median, q);
+    }
+    double start[MODEL_CANDIDATES][3];
+    int n_starts = 0;
+    for (int best_of_all = 0; n_starts < MODEL_CANDIDATES; n_starts++) {
+        int best = 0;
+        for (int k = 1; k < MODEL_HYPOTHESES; k++) { /* the order of the library: both signs of a direction in turn */
+            const int h = (k % 2) * 64 + k / 2;
+            if (votes[h] > votes[best]) { best = h; }
         }
-        for (int sign = 1; sign >= 0; sign--) {
-            if (votes[sign] > most) {
-                most = votes[sign];
-                for (int k = 0; k < 3; k++) { v[k] = (sign == 1) ? q[k] : -q[k]; }
-            }
+        if (n_starts == 0) { best_of_all = votes[best]; }
+        if ((n_starts > 0) && (8 * votes[best] <= 5 * best_of_all)) { break; }
+        model_hypothesis(best, start[n_starts]);
+        for (int h = 0; h < MODEL_HYPOTHESES; h++) {
+            double q[3];
+            model_hypothesis(h, q);
+            const double cosine = q[0] * start[n_starts][0] + q[1] * start[n_starts][1] + q[2] * start[n_starts][2];
+            if (cosine > cos(25.0 * 3.14159265358979323846 / 180.0)) { votes[h] = 0; }
         }
     }
-    for (int i = 0; i < 2; i++) { model_step(f, n, (n + 127u) / 128u, 0.5 * median, 16.0 * median, NULL, v); }
-    double s = 0.0;
+    double noise = 1e9;
+    for (int k = 0; k < n_starts; k++) {
+        for (int i = 0; i < 2; i++) { model_step(f, n, some, 0.5 * median, 16.0 * median, NULL, 1.0, start[k]); }
+        noise = fmin(noise, model_noise(f, n, some, start[k]));
+    }
+    double most_explained = -1.0;
+    for (int k = 0; k < n_starts; k++) {
+        const double wide = fmax(0.02 * median, fmin(median, 2.25 * noise));
+        model_step(f, n, some, wide, 16.0 * median, NULL, 1.0, start[k]);
+        const double explained = model_explained(f, n, some, fmax(0.02 * median, fmin(median, noise)), start[k]);
+        if (explained > most_explained) {
+            most_explained = explained;
+            memcpy(v, start[k], sizeof start[k]);
+        }
+    }
     for (int i = 0; i < 4; i++) {
-        if (i % 2 == 0) { s = fmax(0.02 * median, fmin(median, 2.25 * model_noise(f, n, v))); }
-        model_step(f, n, (i < 2) ? (n + 255u) / 256u : 1u, s, 16.0 * median, NULL, v);
+        const size_t stride = (i == 0) ? some : ((i == 1) ? (n + 255u) / 256u : 1u);
+        if (i == 2) { noise = model_noise(f, n, (n + 255u) / 256u, v); }
+        const double s = fmax(0.02 * median, fmin(median, 2.25 * noise));
+        model_step(f, n, stride, s, 16.0 * median, NULL, (i < 3) ? 1.5 : 0.0, v);
     }
 }
 
@@ -141,7 +215,7 @@ static void model_robust(const model_flow_t *f, size_t n, double v[3])
 static void model_oracle(const model_flow_t *f, size_t n, const unsigned char *bad, const double truth[3], double v[3])
 {
     memcpy(v, truth, 3u * sizeof v[0]);
-    for (int i = 0; i < 10; i++) { model_step(f, n, 1u, 0.0, 1e9, bad, v); }
+    for (int i = 0; i < 10; i++) { model_step(f, n, 1u, 0.0, 1e9, bad, 1.0, v); }
 }
 
 /* --- the published estimators ------------------------------------------------------------------------------------ */

@@ -27,6 +27,8 @@ typedef struct {
     double depth_high_m;
     double way_m;        /* that the camera moves in the interval */
     double object_share; /* share of the image covered by a disc that moves by itself */
+    double object_way_m; /* its way and depth; 0: those of the others */
+    double object_depth_m;
 } scene_settings_t;
 
 static uint64_t scene_seed = 1u;
@@ -56,7 +58,7 @@ static inline void scene_direction(double v[3])
 
 static inline scene_settings_t scene_settings(double noise_px, double outliers)
 {
-    const scene_settings_t s = {noise_px, outliers, 1.0, 5.0, 0.05, 0.0};
+    const scene_settings_t s = {noise_px, outliers, 1.0, 5.0, 0.05, 0.0, 0.0, 0.0};
     return s;
 }
 
@@ -92,10 +94,12 @@ static inline void scene_make_labelled(const scene_settings_t *s, const scene_tr
         const double py = 180.0 * scene_uniform();
         const double x = (px - 132.0) / SCENE_F;
         const double y = (py - 110.0) / SCENE_F;
-        const double z = s->depth_low_m + (s->depth_high_m - s->depth_low_m) * scene_uniform();
         const bool on_object = hypot(px - object_x, py - object_y) < radius_px;
+        const double depth = s->depth_low_m + (s->depth_high_m - s->depth_low_m) * scene_uniform();
+        const double z = (on_object && (s->object_depth_m > 0.0)) ? s->object_depth_m : depth;
         const double *const dir = on_object ? object_v : truth->v;
-        const double way[3] = {dir[0] * s->way_m, dir[1] * s->way_m, dir[2] * s->way_m};
+        const double way_m = (on_object && (s->object_way_m > 0.0)) ? s->object_way_m : s->way_m;
+        const double way[3] = {dir[0] * way_m, dir[1] * way_m, dir[2] * way_m};
         double flow[2];
         scene_flow(x, y, z, way, truth->w, flow);
         out[i] = scene_vector(x, y, flow[0], flow[1]);

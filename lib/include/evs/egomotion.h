@@ -68,8 +68,10 @@ typedef struct { /** Settings. */
     int32_t rotation_sigma_rad_q28;      /**< ROBUST: 1 sigma per axis of the rotation that may be left in the flow over
                                               the interval (rate times interval), [0, 2^28]. Default 0: none is left. */
     uint16_t variance_factor_q8;         /**< The variance of V is multiplied by it, in 1/256: over how many vectors an
-                                              error of the flow extends where windows of the tracker overlap.
-                                              [256, 65535], default 256: errors are independent. */
+                                              error of the flow extends where windows of the tracker overlap. What sigma
+                                              is at least, by halves of the image that disagree and by the rounding of
+                                              the flow, stays as it is. [256, 65535], default 256: errors are
+                                              independent. */
 } evs_egomotion_config_t;
 
 /** Flags of a result. Without VALID, v is the best guess and sigma says half a turn. */
