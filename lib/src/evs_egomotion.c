@@ -9,9 +9,8 @@
 enum {
     WIDE_STEPS = 2,   /* from the hypothesis to where the noise can be judged */
     NARROW_STEPS = 4, /* the noise is judged again after two of them */
-    LONGER = 12,
-    /* eighths: the weights fall off, so that the plain step is too short */
-    SCALE_MIN = 20, /* steps: 2 % of the median flow, what 16 bits resolve without loss */
+    LONGER = 12,      /* eighths: weights fall off, so that a plain step is too short */
+    SCALE_MIN = 20,   /* steps: 2 % of the median flow, what 16 bits resolve without loss */
     SCALE_MAX = 1 << EVS_EGO_MEDIAN_BITS,
     SCALE_WIDE = SCALE_MAX / 2,
     NOISE_VECTORS = 256, /* enough to choose a scale by */

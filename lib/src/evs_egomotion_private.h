@@ -41,7 +41,8 @@ typedef struct {
     int16_t v;
 } evs_ego_vector_t;
 
-/* For which V a vector fits, as the search asks it: its products with a and b are both positive. */
+/* For which V a vector fits, as the search asks it: its products with a and b are both positive. The pairs are read as
+ * words: the scratch is aligned to 4, and so is each wedge. */
 typedef struct {
     int16_t a_xy[2];
     int16_t b_xy[2];

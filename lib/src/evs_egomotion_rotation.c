@@ -179,7 +179,7 @@ static bool find_turn(const evs_ego_set_t *set, uint32_t stride, uint32_t s, evs
  * vector of its length and a random direction would give on average, over what a good one would give less the same. */
 typedef struct {
     uint32_t got;    /* sums */
-    uint32_t chance; /* this one over fewer of them */
+    uint32_t chance; /* over fewer of them */
 } explained_t;
 
 enum { GOOD_Q15 = 27200 }; /* 0.83: the mean of s^2 / (s^2 + r^2) for normal r of half the scale s */
@@ -187,7 +187,8 @@ enum { GOOD_Q15 = 27200 }; /* 0.83: the mean of s^2 / (s^2 + r^2) for normal r o
 static evs_scaled_t share_of(const explained_t *x, uint32_t n, uint32_t n_chance)
 {
     const int64_t by_chance = (int64_t)x->chance * n / n_chance;
-    return evs_scaled_div(evs_scaled(x->got - by_chance, 0), evs_scaled((int64_t)GOOD_Q15 * n - by_chance + 1, 0));
+    const int64_t possible = (int64_t)GOOD_Q15 * n - by_chance;
+    return evs_scaled_div(evs_scaled((int64_t)x->got - by_chance, 0), evs_scaled((possible > 0) ? possible : 1, 0));
 }
 
 /* By how much v explains more of the vectors than a turn does, Q15. Of at most 1024 vectors. */

@@ -82,7 +82,7 @@ static inline int32_t product(const int16_t xy[2], int16_t z, plane_t v)
 {
     int32_t both;
     int32_t sum;
-    memcpy(&both, xy, sizeof both); /* aligned: see evs_ego_wedge_t */
+    memcpy(&both, xy, sizeof both);
     __asm__("smlad %0, %1, %2, %3" : "=r"(sum) : "r"(both), "r"(v.xy), "r"(z * v.z));
     return sum;
 }

@@ -7,10 +7,11 @@
  * Model    u = rho (x Vz - Vx), v = rho (y Vz - Vy), rho > 0: what a still scene at unknown depths shows to a camera
  *          that moves along V without turning. (x, y) is a position in K^-1 px, (u, v) its displacement.
  *          ROBUST: 64 directions spread evenly over a half sphere, each with both signs, are tried on at most 128 of
- *          the vectors; the best is refined by Gauss-Newton steps on the residual across the flow direction, with
- *          weights of Geman and McClure and a scale that stands when half of the vectors are outliers. The sign is
- *          part of the estimate. With a prior on the residual rotation, V and a rotation are estimated together: for
- *          an attitude that is not perfect.
+ *          the vectors; up to three that lie apart are led on by Gauss-Newton steps on the residual across the flow
+ *          direction, with weights of Geman and McClure and a scale that stands when half of the vectors are outliers;
+ *          the one that explains most vectors to within the noise is refined. The sign is part of the estimate. Sigma
+ *          covers halves of the image that disagree, as an object that moves by itself makes them. With a prior on
+ *          the residual rotation, V and a rotation are estimated together: for an attitude that is not perfect.
  *          PAPER and ERL: the published estimators [1], [2], for comparison. They are slower and 2 to 7 times less
  *          accurate; they state no sign, here the majority of the vectors gives it.
  *          Never feed it normal flow, that is the component across an edge, as a plane fit to the time surface gives:
