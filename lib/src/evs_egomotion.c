@@ -9,12 +9,12 @@
 enum {
     WIDE_STEPS = 2,   /* from the hypothesis to where the noise can be judged */
     NARROW_STEPS = 4, /* the noise is judged again after two of them */
-    LONGER = 12,      /* eighths: weights fall off, so that a plain step is too short */
+    LONGER = 11,      /* eighths: weights fall off, so that a plain step is too short */
     SCALE_MIN = 20,   /* steps: 2 % of the median flow, what 16 bits resolve without loss */
     SCALE_MAX = 1 << EVS_EGO_MEDIAN_BITS,
     SCALE_WIDE = SCALE_MAX / 2,
     NOISE_VECTORS = 256, /* enough to choose a scale by */
-    HALVES_Q8 = 35,      /* sigma is at least 1 / 2.7 of how far a half of the image is off, the square in 1/256 */
+    HALVES_Q8 = 37,      /* sigma is at least 1 / 2.6 of how far a half of the image is off, the square in 1/256 */
     INLIER_LIMIT_MIN = 8 /* steps: the rounding of what is free of noise */
 };
 

@@ -207,7 +207,7 @@ static void model_robust(const model_flow_t *f, size_t n, double v[3])
         const size_t stride = (i == 0) ? some : ((i == 1) ? (n + 255u) / 256u : 1u);
         if (i == 2) { noise = model_noise(f, n, (n + 255u) / 256u, v); }
         const double s = fmax(0.02 * median, fmin(median, 2.25 * noise));
-        model_step(f, n, stride, s, 16.0 * median, NULL, (i < 3) ? 1.5 : 0.0, v);
+        model_step(f, n, stride, s, 16.0 * median, NULL, (i < 3) ? 1.375 : 0.0, v);
     }
 }
 
