@@ -29,8 +29,8 @@ evs_egomotion_config_t evs_egomotion_config_default(void)
 
 static bool config_ok(const evs_egomotion_config_t *cfg)
 {
-    return ((cfg->method == EVS_EGOMOTION_ROBUST) || (cfg->method == EVS_EGOMOTION_PAPER) ||
-            (cfg->method == EVS_EGOMOTION_ERL)) &&
+    const bool published = (cfg->method == EVS_EGOMOTION_PAPER) || (cfg->method == EVS_EGOMOTION_ERL);
+    return ((cfg->method == EVS_EGOMOTION_ROBUST) || (published && (EVS_NO_PAPER == 0))) &&
            (cfg->flow_kind == EVS_EGOMOTION_FULL_FLOW) && (cfg->rotation_sigma_rad_q28 >= 0) &&
            (cfg->rotation_sigma_rad_q28 <= ROTATION_SIGMA_MAX) && (cfg->variance_factor_q8 >= 256u);
 }
@@ -297,6 +297,7 @@ static void solve_robust(const evs_egomotion_config_t *cfg, const evs_ego_call_t
 
 /* --- the published estimates ------------------------------------------------------------------------------------ */
 
+#if !EVS_NO_PAPER
 static void solve_paper(const evs_egomotion_config_t *cfg, const evs_ego_call_t *call, evs_egomotion_result_t *result)
 {
     const evs_ego_set_t *const set = &call->set;
@@ -311,6 +312,7 @@ static void solve_paper(const evs_egomotion_config_t *cfg, const evs_ego_call_t 
     const evs_ego_frame_t f = evs_ego_frame(result->v_q30);
     put_spread(cfg, &j, definite ? cov : NULL, &f, result);
 }
+#endif
 
 /* --- the call --------------------------------------------------------------------------------------------------- */
 
@@ -338,9 +340,12 @@ evs_status_t evs_egomotion_solve(const evs_egomotion_config_t *cfg, const evs_eg
         r.flags = EVS_EGOMOTION_FEW | EVS_EGOMOTION_STILL;
     } else if (robust) {
         solve_robust(cfg, &call, &r);
-    } else {
+    }
+#if !EVS_NO_PAPER
+    else {
         solve_paper(cfg, &call, &r);
     }
+#endif
     if (r.flags == 0u) {
         r.flags = EVS_EGOMOTION_VALID;
     } else {

@@ -11,6 +11,8 @@
  *   EVS_NO_SIMD       1 keeps to the plain C kernels. Default 0. The output bits are the same either way.
  *   EVS_NO_IMAGES     1 takes images and the direction of flight out of the pipeline, which refuses settings that ask for
  *                     them. Default 0. It saves the flash of what would be linked without being used.
+ *   EVS_NO_PAPER      1 takes the published estimators PAPER and ERL out of egomotion.h, which refuses settings that ask
+ *                     for them. Default 0. It saves some 5 KB of flash.
  */
 #ifndef EVS_CONFIG_H
 #define EVS_CONFIG_H
@@ -30,6 +32,10 @@
 
 #ifndef EVS_NO_IMAGES
 #define EVS_NO_IMAGES 0
+#endif
+
+#ifndef EVS_NO_PAPER
+#define EVS_NO_PAPER 0
 #endif
 
 #if defined(__GNUC__)
