@@ -42,16 +42,12 @@ typedef struct {
 } evs_ego_vector_t;
 
 /* For which V a vector fits, as the search asks it: its products with a and b are both positive. The pairs are read as
- * words: the scratch is aligned to 4, and so is each wedge. */
+ * words: the scratch is aligned to 4. */
 typedef struct {
-    int16_t a_xy[2];
-    int16_t b_xy[2];
-    int16_t a_z;
-    int16_t b_z;
-} evs_ego_wedge_t;
-
-typedef struct {
-    evs_ego_wedge_t wedge[EVS_EGO_SUBSET];
+    int16_t a_xy[EVS_EGO_SUBSET][2];
+    int16_t b_xy[EVS_EGO_SUBSET][2];
+    int16_t a_z[EVS_EGO_SUBSET];
+    int16_t b_z[EVS_EGO_SUBSET];
 } evs_ego_subset_t;
 
 EVS_STATIC_ASSERT(sizeof(evs_ego_subset_t) + sizeof(evs_ego_vector_t) + sizeof(uint16_t) <= EVS_EGOMOTION_BYTES(1),

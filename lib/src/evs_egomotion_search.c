@@ -6,6 +6,10 @@
 
 #include <string.h>
 
+#if EVS_SIMD_X86
+#include <emmintrin.h>
+#endif
+
 /* z = 1 - (i + 1/2) / 64, turned by the golden angle from one to the next: equal areas, gaps of 6.9 degrees on average
  * and at most 13.6. Q14. */
 enum { N_HYPOTHESES = 64 };
@@ -40,7 +44,7 @@ static void put_normal(int32_t x, int32_t y, int32_t z, int16_t xy[2], int16_t *
 /* c and d are linear in V: c = n V, d = m V. As c^2 + d^2 = |u|^2 |a|^2, the residual is below s and the depth positive
  * where |c| <= k d, k = s / sqrt(|u|^2 - s^2): that is where the products of V with k m + n and with k m - n are both
  * positive. For -V both are negative. */
-static void make_wedge(const evs_ego_set_t *set, const evs_ego_vector_t *p, evs_ego_wedge_t *w)
+static void make_wedge(const evs_ego_set_t *set, const evs_ego_vector_t *p, uint32_t i)
 {
     const int32_t u2 = p->u * p->u + p->v * p->v;
     const unsigned shift = set->one_bits + 1u;
@@ -49,8 +53,9 @@ static void make_wedge(const evs_ego_set_t *set, const evs_ego_vector_t *p, evs_
     if (u2 > S2 + S2 / 256) { k_q12 = (int32_t)((uint32_t)(S << 12) / evs_sqrt_u64((uint64_t)(uint32_t)(u2 - S2))); }
     const int32_t m[3] = {(-p->u * k_q12) >> 12, (-p->v * k_q12) >> 12, (int32_t)(((int64_t)mz * k_q12) >> 12)};
     const int32_t n[3] = {p->v, -p->u, (p->u * p->y - p->v * p->x) >> shift};
-    put_normal(m[0] + n[0], m[1] + n[1], m[2] + n[2], w->a_xy, &w->a_z);
-    put_normal(m[0] - n[0], m[1] - n[1], m[2] - n[2], w->b_xy, &w->b_z);
+    evs_ego_subset_t *const w = set->subset;
+    put_normal(m[0] + n[0], m[1] + n[1], m[2] + n[2], w->a_xy[i], &w->a_z[i]);
+    put_normal(m[0] - n[0], m[1] - n[1], m[2] - n[2], w->b_xy[i], &w->b_z[i]);
 }
 
 /* Every so many of the vectors, so that they come from all over the list. */
@@ -59,9 +64,7 @@ static uint32_t pick(const evs_ego_set_t *set)
     const uint32_t n = (set->n < EVS_EGO_SUBSET) ? set->n : EVS_EGO_SUBSET;
     const uint32_t stride_q16 = (set->n << 16) / n; /* n <= 65535 */
     uint32_t at_q16 = 0u;
-    for (uint32_t i = 0u; i < n; i++, at_q16 += stride_q16) {
-        make_wedge(set, &set->vec[at_q16 >> 16], &set->subset->wedge[i]);
-    }
+    for (uint32_t i = 0u; i < n; i++, at_q16 += stride_q16) { make_wedge(set, &set->vec[at_q16 >> 16], i); }
     return n;
 }
 
@@ -105,20 +108,75 @@ static inline int32_t product(const int16_t xy[2], int16_t z, plane_t v) { retur
 
 #endif
 
-/* How many vectors fit a direction and its opposite. A plain count spares a division per vector and hypothesis. */
-static void score(const evs_ego_wedge_t *w, uint32_t n, const int16_t v[3], uint8_t points[2])
+/* Of vectors: how many do not fit a direction, and how many fit its opposite. */
+typedef struct {
+    uint32_t not_forward;
+    uint32_t backward;
+} tally_t;
+
+#if EVS_SIMD_X86
+
+/* The products of four pairs and their z with V, in 32 bits each. */
+static inline __m128i products(const int16_t (*xy)[2], const int16_t *z, __m128i v_xy, __m128i v_z)
+{
+    const __m128i pairs = _mm_loadu_si128((const __m128i *)(const void *)xy);
+    const __m128i four_z = _mm_unpacklo_epi16(_mm_loadl_epi64((const __m128i *)(const void *)z), _mm_setzero_si128());
+    return _mm_add_epi32(_mm_madd_epi16(pairs, v_xy), _mm_madd_epi16(four_z, v_z));
+}
+
+static inline uint32_t sum_of_four(__m128i x)
+{
+    const __m128i two = _mm_add_epi32(x, _mm_shuffle_epi32(x, _MM_SHUFFLE(1, 0, 3, 2)));
+    return (uint32_t)_mm_cvtsi128_si32(_mm_add_epi32(two, _mm_shuffle_epi32(two, _MM_SHUFFLE(2, 3, 0, 1))));
+}
+
+/* Vectors [from, to) by fours, as far as these go; returns where they end. */
+static uint32_t tally_fours(const evs_ego_subset_t *w, uint32_t from, uint32_t to, const int16_t v[3], tally_t *tally)
+{
+    const __m128i v_xy = _mm_set1_epi32((int32_t)((uint32_t)(uint16_t)v[0] | ((uint32_t)(uint16_t)v[1] << 16)));
+    const __m128i v_z = _mm_set1_epi32((uint16_t)v[2]);
+    __m128i not_forward = _mm_setzero_si128();
+    __m128i backward = _mm_setzero_si128();
+    uint32_t i = from;
+    for (; i + 4u <= to; i += 4u) {
+        const __m128i a = products(&w->a_xy[i], &w->a_z[i], v_xy, v_z);
+        const __m128i b = products(&w->b_xy[i], &w->b_z[i], v_xy, v_z);
+        not_forward = _mm_add_epi32(not_forward, _mm_srli_epi32(_mm_or_si128(a, b), 31));
+        backward = _mm_add_epi32(backward, _mm_srli_epi32(_mm_and_si128(a, b), 31));
+    }
+    tally->not_forward += sum_of_four(not_forward);
+    tally->backward += sum_of_four(backward);
+    return i;
+}
+
+#else
+
+static inline uint32_t tally_fours(const evs_ego_subset_t *w, uint32_t from, uint32_t to, const int16_t v[3],
+                                   tally_t *tally)
+{
+    (void)w;
+    (void)to;
+    (void)v;
+    (void)tally;
+    return from;
+}
+
+#endif
+
+/* How many of the vectors [from, to) fit a direction and its opposite. A plain count spares a division per vector and
+ * hypothesis. */
+static void score(const evs_ego_subset_t *w, uint32_t from, uint32_t to, const int16_t v[3], uint8_t points[2])
 {
     const plane_t p = plane(v);
-    uint32_t not_forward = 0u;
-    uint32_t backward = 0u;
-    for (uint32_t i = 0u; i < n; i++) {
-        const int32_t a = product(w[i].a_xy, w[i].a_z, p);
-        const int32_t b = product(w[i].b_xy, w[i].b_z, p);
-        not_forward += (uint32_t)(a | b) >> 31;
-        backward += (uint32_t)(a & b) >> 31;
+    tally_t tally = {0u, 0u};
+    for (uint32_t i = tally_fours(w, from, to, v, &tally); i < to; i++) {
+        const int32_t a = product(w->a_xy[i], w->a_z[i], p);
+        const int32_t b = product(w->b_xy[i], w->b_z[i], p);
+        tally.not_forward += (uint32_t)(a | b) >> 31;
+        tally.backward += (uint32_t)(a & b) >> 31;
     }
-    points[0] = (uint8_t)(points[0] + (n - not_forward));
-    points[1] = (uint8_t)(points[1] + backward);
+    points[0] = (uint8_t)(points[0] + (to - from - tally.not_forward));
+    points[1] = (uint8_t)(points[1] + tally.backward);
 }
 
 enum { APART_Q28 = 243283000 }; /* the cosine of 25 degrees */
@@ -134,14 +192,14 @@ uint32_t evs_ego_search(const evs_ego_set_t *set, evs_vec3_t best[EVS_EGO_CANDID
     for (int h = 0; h < N_HYPOTHESES; h++) {
         points[h][0] = 0u;
         points[h][1] = 0u;
-        score(set->subset->wedge, half, HEMISPHERE[h], points[h]);
+        score(set->subset, 0u, half, HEMISPHERE[h], points[h]);
         for (int i = 0; i < 2; i++) {
             if (points[h][i] > most) { most = points[h][i]; }
         }
     }
     for (int h = 0; h < N_HYPOTHESES; h++) { /* what is far behind half-way does not win */
         if ((points[h][0] * 8u >= most * 5u) || (points[h][1] * 8u >= most * 5u)) {
-            score(set->subset->wedge + half, n - half, HEMISPHERE[h], points[h]);
+            score(set->subset, half, n, HEMISPHERE[h], points[h]);
         }
     }
     for (uint32_t k = 0u; k < EVS_EGO_CANDIDATES; k++) {
