@@ -50,14 +50,6 @@ static double solve(const scene_truth_t *truth, size_t n)
     return scene_error_deg(&result, truth->v);
 }
 
-static double angle_deg(const double a[3], const double b[3])
-{
-    double c[3];
-    model_cross(a, b, c);
-    return atan2(sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]), a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) * 180.0 /
-           SCENE_PI;
-}
-
 static int by_size(const void *a, const void *b)
 {
     const double p = *(const double *)a;
@@ -86,10 +78,10 @@ static void check_cell(int noise, int outliers)
         sum_sq += errors[t] * errors[t];
         sigma_sq += scene_sigma_deg(&result) * scene_sigma_deg(&result);
         model_robust(flow_d, N, model);
-        of_model += angle_deg(model, truth.v);
+        of_model += model_angle_between(model, truth.v) * 180.0 / MODEL_PI;
         apart += scene_error_deg(&result, model);
         model_oracle(flow_d, N, bad, truth.v, oracle);
-        of_oracle += angle_deg(oracle, truth.v);
+        of_oracle += model_angle_between(oracle, truth.v) * 180.0 / MODEL_PI;
     }
     qsort(errors, TRIALS, sizeof errors[0], by_size);
     const double mean = sum / TRIALS;
@@ -217,7 +209,7 @@ static void test_few_vectors_leave_sigma_honest(void)
 static void test_residual_rotation(void)
 {
     const scene_settings_t s = scene_settings(0.5, 0.1);
-    const double rotation = 0.05 * SCENE_PI / 180.0; /* 1 deg/s over 50 ms */
+    const double rotation = 0.05 * MODEL_PI / 180.0; /* 1 deg/s over 50 ms */
     int n_valid;
     TEST_ASSERT_TRUE(mean_error(&s, rotation, N, &n_valid) <= 1.8);
     cfg.rotation_sigma_rad_q28 = evs_q_from_double(rotation, 28);
@@ -266,7 +258,7 @@ static void test_never_confident_and_wrong(void)
         TEST_ASSERT_TRUE(n_valid >= ((noise < 2) ? TRIALS * 99 / 100 : TRIALS * 2 / 3));
         s = scene_settings(NOISE_PX[noise], 0.1); /* nothing but rotation: 1 degree, 3.5 px */
         s.way_m = 0.0;
-        (void)count_wrong(&s, SCENE_PI / 180.0, N, &n_valid);
+        (void)count_wrong(&s, MODEL_PI / 180.0, N, &n_valid);
         TEST_ASSERT_TRUE(n_valid <= TRIALS / 50);
         (void)count_wrong(&s, 0.0, N, &n_valid); /* nothing but noise */
         TEST_ASSERT_EQUAL_INT(0, n_valid);

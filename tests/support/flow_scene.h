@@ -9,11 +9,11 @@
 
 #include "evs/egomotion.h"
 #include "evs/float.h"
+#include "model.h"
 
 #include <math.h>
 
-#define SCENE_PI 3.14159265358979323846
-#define SCENE_F  199.0
+#define SCENE_F 199.0
 
 typedef struct {
     double v[3]; /* truth: own velocity, unit */
@@ -43,13 +43,13 @@ static inline double scene_uniform(void)
 static inline double scene_normal(void)
 {
     const double r = sqrt(-2.0 * log(1.0 - scene_uniform()));
-    return r * cos(2.0 * SCENE_PI * scene_uniform());
+    return r * cos(2.0 * MODEL_PI * scene_uniform());
 }
 
 static inline void scene_direction(double v[3])
 {
     const double z = 2.0 * scene_uniform() - 1.0;
-    const double angle = 2.0 * SCENE_PI * scene_uniform();
+    const double angle = 2.0 * MODEL_PI * scene_uniform();
     const double r = sqrt(1.0 - z * z);
     v[0] = r * cos(angle);
     v[1] = r * sin(angle);
@@ -84,7 +84,7 @@ static inline void scene_flow(double x, double y, double z, const double way[3],
 static inline void scene_make_labelled(const scene_settings_t *s, const scene_truth_t *truth, evs_egomotion_flow_t *out,
                                        size_t n, unsigned char *bad)
 {
-    const double radius_px = sqrt(s->object_share * 240.0 * 180.0 / SCENE_PI);
+    const double radius_px = sqrt(s->object_share * 240.0 * 180.0 / MODEL_PI);
     const double object_x = 40.0 + 160.0 * scene_uniform();
     const double object_y = 40.0 + 100.0 * scene_uniform();
     double object_v[3];
@@ -111,7 +111,7 @@ static inline void scene_make_labelled(const scene_settings_t *s, const scene_tr
         if (scene_uniform() < s->outliers) {
             const evs_egomotion_flow_t *const other = &out[(size_t)(scene_uniform() * (double)n)];
             const double length = hypot(evs_q_to_double(other->u_q24, 24), evs_q_to_double(other->v_q24, 24));
-            const double angle = 2.0 * SCENE_PI * scene_uniform();
+            const double angle = 2.0 * MODEL_PI * scene_uniform();
             u = length * cos(angle);
             v = length * sin(angle);
             if (bad != NULL) { bad[i] = 1u; }
@@ -131,16 +131,14 @@ static inline void scene_make(const scene_settings_t *s, const scene_truth_t *tr
 
 static inline double scene_error_deg(const evs_egomotion_result_t *result, const double v[3])
 {
-    const double r[3] = {evs_q_to_double(result->v_q30.x, 30), evs_q_to_double(result->v_q30.y, 30),
-                         evs_q_to_double(result->v_q30.z, 30)};
-    const double cross[3] = {r[1] * v[2] - r[2] * v[1], r[2] * v[0] - r[0] * v[2], r[0] * v[1] - r[1] * v[0]};
-    const double dot = r[0] * v[0] + r[1] * v[1] + r[2] * v[2];
-    return atan2(sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]), dot) * 180.0 / SCENE_PI;
+    double found[3];
+    model_from_unit(result->v_q30, found);
+    return model_angle_between(found, v) * 180.0 / MODEL_PI;
 }
 
 static inline double scene_sigma_deg(const evs_egomotion_result_t *result)
 {
-    return evs_q_to_double(result->sigma_rad_q28, 28) * 180.0 / SCENE_PI;
+    return evs_q_to_double(result->sigma_rad_q28, 28) * 180.0 / MODEL_PI;
 }
 
 #endif

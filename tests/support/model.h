@@ -74,6 +74,21 @@ static inline double model_angle(model_quat_t a, model_quat_t b)
     return 2.0 * atan2(sqrt(d.x * d.x + d.y * d.y + d.z * d.z), fabs(d.w));
 }
 
+/* Angle between two vectors, rad. */
+static inline double model_angle_between(const double a[3], const double b[3])
+{
+    const double cross[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+    return atan2(sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]),
+                 a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
+}
+
+static inline void model_from_unit(evs_vec3_t v_q30, double out[3])
+{
+    out[0] = evs_q_to_double(v_q30.x, 30);
+    out[1] = evs_q_to_double(v_q30.y, 30);
+    out[2] = evs_q_to_double(v_q30.z, 30);
+}
+
 static inline evs_quat_t model_to_fixed(model_quat_t q) { return evs_quat_from_double(q.w, q.x, q.y, q.z); }
 
 static inline model_quat_t model_from_fixed(evs_quat_t q)

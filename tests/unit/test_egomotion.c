@@ -180,7 +180,7 @@ static void test_random_directions_are_chance(void)
 {
     for (int k = 0; k < 20; k++) {
         for (size_t i = 0; i < N_MAX; i++) {
-            const double angle = 2.0 * SCENE_PI * scene_uniform();
+            const double angle = 2.0 * MODEL_PI * scene_uniform();
             flow[i] = scene_vector(scene_uniform() - 0.5, scene_uniform() - 0.5, 0.01 * cos(angle), 0.01 * sin(angle));
         }
         solve(N_MAX);

@@ -235,12 +235,10 @@ static void fly_ms(uint32_t duration_ms, bool oriented)
 static double error_deg(evs_vec3_t v_q30, model_quat_t q_wf)
 {
     double want[3];
+    double got[3];
     model_rotate(model_conj(q_wf), v_w, want);
-    const double got[3] = {evs_q_to_double(v_q30.x, 30), evs_q_to_double(v_q30.y, 30), evs_q_to_double(v_q30.z, 30)};
-    const double cross[3] = {want[1] * got[2] - want[2] * got[1], want[2] * got[0] - want[0] * got[2],
-                             want[0] * got[1] - want[1] * got[0]};
-    const double dot = want[0] * got[0] + want[1] * got[1] + want[2] * got[2];
-    return atan2(sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]), dot) / DEG;
+    model_from_unit(v_q30, got);
+    return model_angle_between(got, want) / DEG;
 }
 
 /* Of the results from `from` on, those over at least 50 ms are valid and, in both frames, right: on average within mean_deg,
