@@ -25,6 +25,7 @@ set(EVS_SOURCES
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow_plain.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_flow_sse2.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_gauss_table.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_gyro_bias.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_homography.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_homography_avx2.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_homography_dsp.c

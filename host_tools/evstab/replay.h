@@ -90,7 +90,7 @@ typedef struct {
     evs_pipeline_counts_t counts;
     evs_attitude_faults_t attitude_faults;
     bool gyro_bias_known;     /**< In the end: told or learnt at rest. */
-    evs_vec3_t gyro_bias_q24; /**< Of the filter in the end, rad/s. */
+    evs_vec3_t gyro_bias_q24; /**< In the end, rad/s. */
 } evt_replay_result_t;
 
 /** The output files of a run. */

@@ -321,7 +321,7 @@ bool evt_replay_run(const evt_replay_t *r, const char *dir, const evt_replay_wat
         result->counts = evs_pipeline_counts(&run->pipeline);
         if (part != NULL) { result->velocity.library = evs_velocity_counts(part); }
         result->attitude_faults = evs_attitude_faults(evs_pipeline_attitude(&run->pipeline));
-        result->gyro_bias_q24 = evs_attitude_bias(evs_pipeline_attitude(&run->pipeline));
+        result->gyro_bias_q24 = evs_pipeline_gyro_bias(&run->pipeline);
         result->gyro_bias_known =
             (evs_attitude_flags(evs_pipeline_attitude(&run->pipeline)) & EVS_ATTITUDE_BIAS_KNOWN) != 0u;
     }

@@ -57,6 +57,7 @@ evs_pipeline_config_t evs_pipeline_config_velocity(const evs_camera_config_t *ca
     cfg.image = EVS_PIPELINE_IMAGE_IWE;
     cfg.velocity_on = true;
     cfg.velocity.residual_rate_rad_s_q24 = RESIDUAL_RATE_Q24;
+    cfg.velocity.learn_bias = true;
     return cfg;
 }
 
@@ -275,6 +276,10 @@ void evs_pipeline_push_gyro(evs_pipeline_t *p, uint32_t t_us, evs_vec3_t rate_ra
 {
     EVS_ASSERT((p != NULL) && (p->cfg.source == EVS_PIPELINE_IMU));
     evs_attitude_push_gyro(&p->attitude, t_us, rate_rad_s_q24);
+    if (!p->bias_known && ((evs_attitude_flags(&p->attitude) & EVS_ATTITUDE_BIAS_KNOWN) != 0u)) {
+        p->bias_known = true;
+        p->bias_known_us = t_us + (uint32_t)p->cfg.track.offset_us;
+    }
     const evs_vec3_t rate_c = evs_quat_rotate(p->cfg.q_ci, evs_attitude_rate(&p->attitude));
     follow_attitude(p, t_us, evs_quat_mul(evs_attitude_orientation(&p->attitude), evs_quat_conj(p->cfg.q_ci)), rate_c);
     const evs_orientation_t sample = {.t_us = t_us, .q_wc = p->view_q_wc, .rate_rad_s_q24 = rate_c};
@@ -544,6 +549,15 @@ evs_status_t evs_pipeline_newest_orientation(const evs_pipeline_t *p, evs_orient
     if (status == EVS_OK) { status = evs_orientation_track_at(&p->track, t_us, newest); }
     if (status == EVS_OK) { newest->t_us = t_us - (uint32_t)p->cfg.track.offset_us; }
     return status;
+}
+
+evs_vec3_t evs_pipeline_gyro_bias(const evs_pipeline_t *p)
+{
+    EVS_ASSERT(p != NULL);
+    const evs_velocity_t *const v = evs_pipeline_velocity_part(p);
+    const evs_vec3_t by_filter = evs_attitude_bias(&p->attitude);
+    if (v == NULL) { return by_filter; }
+    return evs_vec3_add(by_filter, evs_quat_rotate(evs_quat_conj(p->cfg.q_ci), evs_velocity_bias(v)));
 }
 
 evs_pipeline_counts_t evs_pipeline_counts(const evs_pipeline_t *p)

@@ -286,6 +286,10 @@ static void begin_velocity(evs_pipeline_t *p, const evs_pipeline_chunk_t *chunk)
         m->flow = m->velocity.grid;
         m->flow_q_wr = m->velocity.grid_q_wr;
     }
+    /* A bias that the filter knows is in the view no longer. */
+    m->bias_known = m->bias_known || (p->bias_known && (evs_time_diff_us(chunk->image_t_us, p->bias_known_us) >= 0));
+    evs_velocity_learn_bias(&m->velocity,
+                            p->cfg.velocity.learn_bias && (p->cfg.source == EVS_PIPELINE_IMU) && !m->bias_known);
     const evs_velocity_image_t image = {.px = chunk->image.px, .t_us = chunk->image_t_us, .q_wr = reference_of(p)};
     uint8_t *const scratch = (m->plane != NULL) ? m->plane : m->votes; /* the votes have been rendered */
     const evs_status_t status = evs_velocity_begin(&m->velocity, &image, scratch);

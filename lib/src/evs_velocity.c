@@ -163,6 +163,13 @@ void evs_velocity_push_orientation(evs_velocity_t *v, const evs_orientation_t *s
     v->orientation_known = true;
 }
 
+void evs_velocity_learn_bias(evs_velocity_t *v, bool on)
+{
+    EVS_ASSERT(v != NULL);
+    v->cfg.learn_bias = on;
+    if (!on) { evs_gyro_bias_reset(&v->bias); }
+}
+
 static bool same_rotation(evs_quat_t a, evs_quat_t b)
 {
     return (a.w == b.w) && (a.x == b.x) && (a.y == b.y) && (a.z == b.z);
@@ -338,7 +345,7 @@ evs_egomotion_flow_t evs_velocity_flow_of(const evs_velocity_t *v, const evs_flo
         .y_q24 = calibrated_q24(track->from.y_q8 + track->to.y_q8, k->cy_q16, v->per_fy_q32),
         .u_q24 = evs_sat32(evs_shr_r64((int64_t)(track->from.x_q8 - track->to.x_q8) * v->per_fx_q32, 16)),
         .v_q24 = evs_sat32(evs_shr_r64((int64_t)(track->from.y_q8 - track->to.y_q8) * v->per_fy_q32, 16))};
-    return flow;
+    return evs_gyro_bias_take_out(flow, v->left_rad_q28);
 }
 
 /* The median by halving the range of values: needs no order and no memory. Of an even number the lower one. */
@@ -478,6 +485,9 @@ static void solve(evs_velocity_t *v)
     uint32_t *const scratch = &lengths_q8[v->n_tracks_max];
     evs_velocity_result_t *const pair = &v->pair;
 
+    const bool learning = v->cfg.learn_bias && ((pair->flags & EVS_VELOCITY_NO_ORIENTATION) == 0u);
+    v->left_rad_q28 = (evs_vec3_t){0, 0, 0};
+    if (learning) { v->left_rad_q28 = evs_gyro_bias_left(&v->bias, v->middle_q_cr, pair->interval_us); }
     const size_t n = collect_flow(v, flow, lengths_q8);
     pair->n_flow = (uint16_t)n;
     pair->flow_px_q8 = median(lengths_q8, n);
@@ -495,6 +505,16 @@ static void solve(evs_velocity_t *v)
     if ((pair->flags & INVALID) == 0u) {
         pair->flags |= EVS_VELOCITY_VALID;
         evs_count(&v->counts.n_valid);
+        if (learning) {
+            const evs_gyro_bias_pair_t told = {.flow = flow,
+                                               .n = n,
+                                               .v_q30 = pair->solution.v_q30,
+                                               .noise_q24 = pair->solution.noise_q24,
+                                               .q_cr = v->middle_q_cr,
+                                               .t_us = pair->t_us,
+                                               .interval_us = pair->interval_us};
+            evs_gyro_bias_learn(&v->bias, &told);
+        }
     }
     learn(v, samples, collect_samples(v, samples));
 

@@ -9,7 +9,7 @@ usage: velocity.py EVSTAB truth|order|imu|slider|windows
 truth    two simulated flights, default settings, true attitude: the error, its own idea of it, and how often there is one
 order    the paper's claims: stabilized beats full ERL on the same flow, IWE beats time surface, slices beat windows, and
          a rotation per window needs a warp
-imu      the attitude from the IMU, its gyro bias known: little worse than true attitude
+imu      the attitude from the IMU, its gyro bias known: little worse than true attitude; unknown: learnt from the flow
 slider   a complete real recording that moves along +x
 windows  short real recordings of a camera that is moved by hand
 
@@ -139,6 +139,10 @@ def test_imu(evstab, temp):
         raw = Errors(replay(evstab, temp / f"{name} raw", folder, "--attitude", "imu"), truth)
         print(f"     {name}: true attitude: {by_truth.text()}")
         print(f"     {name}: bias {np.round(bias, 4)} rad/s; not told: {raw.text()}")
+        known = json.loads((temp / f"{name} raw" / "summary.json").read_text())["attitude"]["gyro_bias_rad_s"]
+        check(f"{name}: bias learnt from the flow", raw.mean <= 1.5 * by_truth.mean,
+              f"{raw.mean / by_truth.mean:.2f} times the error of true attitude")
+        check(f"{name}: nearer to the bias than zero", np.linalg.norm(known - bias) < np.linalg.norm(bias), known)
         check(f"{name}: attitude from the IMU", by_imu.mean <= 1.3 * by_truth.mean,
               f"{by_imu.text()}; {by_imu.mean / by_truth.mean:.2f} times that of true attitude")
 

@@ -42,7 +42,8 @@ static bool late_work; /* one step of work a chunk, not all at once */
 static uint32_t t_start_us;
 static uint32_t t_now_us;
 static uint32_t seed;
-static int32_t offset_us; /* of the events' clock against that of the orientations */
+static double gyro_bias[3]; /* of the gyro, with source IMU */
+static int32_t offset_us;   /* of the events' clock against that of the orientations */
 
 /* What came out. */
 static evs_velocity_result_t results[N_RESULTS];
@@ -104,6 +105,7 @@ void setUp(void)
     never_work = false;
     late_work = false;
     offset_us = 0;
+    gyro_bias[0] = gyro_bias[1] = gyro_bias[2] = 0.0;
     t_start_us = 9000u;
 }
 void tearDown(void) { TEST_ASSERT_TRUE_MESSAGE(memory[BYTES / 8u] == CANARY, "wrote past"); }
@@ -119,6 +121,12 @@ static void push_orientation(uint32_t t_us)
 {
     const double t_s = seconds(t_us), h = 1e-5;
     const model_quat_t d = model_mul(model_conj(camera_at(t_s - h)), camera_at(t_s + h));
+    if (p.cfg.source == EVS_PIPELINE_IMU) {
+        const evs_vec3_t rate =
+            evs_vec3_from_double(d.x / h + gyro_bias[0], d.y / h + gyro_bias[1], d.z / h + gyro_bias[2], 24);
+        evs_pipeline_push_gyro(&p, t_us - (uint32_t)offset_us, rate);
+        return;
+    }
     const evs_orientation_t s = {.t_us = t_us - (uint32_t)offset_us,
                                  .q_wc = model_to_fixed(camera_at(t_s)),
                                  .rate_rad_s_q24 = evs_vec3_from_double(d.x / h, d.y / h, d.z / h, 24)};
@@ -277,6 +285,52 @@ static void test_shaken_camera_finds_its_direction_of_flight(void)
     TEST_ASSERT_EQUAL_UINT32(n_images, n.n_images);
     TEST_ASSERT_EQUAL_UINT32(0u, n.n_images_busy);
     TEST_ASSERT_EQUAL_UINT32(n_results, evs_velocity_counts(evs_pipeline_velocity_part(&p)).n_results);
+}
+
+/* The gyro alone, which begins where the camera is. */
+static void init_by_gyro(evs_pipeline_config_t *cfg)
+{
+    cfg->source = EVS_PIPELINE_IMU;
+    cfg->attitude.mode = EVS_ATTITUDE_GYRO_ONLY;
+    init(cfg);
+    TEST_ASSERT_EQUAL_INT(EVS_OK,
+                          evs_attitude_set_orientation(evs_pipeline_attitude(&p), model_to_fixed(camera_at(0.0))));
+}
+
+static double bias_missed(void)
+{
+    const evs_vec3_t known = evs_pipeline_gyro_bias(&p);
+    return sqrt(pow(evs_q_to_double(known.x, 24) - gyro_bias[0], 2) +
+                pow(evs_q_to_double(known.y, 24) - gyro_bias[1], 2) +
+                pow(evs_q_to_double(known.z, 24) - gyro_bias[2], 2));
+}
+
+static void test_bias_of_the_gyro_is_learnt_until_it_is_known(void)
+{
+    gyro_bias[0] = 0.05;
+    gyro_bias[1] = -0.04;
+    gyro_bias[2] = 0.06;
+    const evs_vec3_t told = evs_vec3_from_double(gyro_bias[0], gyro_bias[1], gyro_bias[2], 24);
+    evs_pipeline_config_t cfg = config();
+    cfg.velocity.learn_bias = false;
+    init_by_gyro(&cfg);
+    const double nothing_known = bias_missed();
+    fly_ms(300u, true);
+    TEST_ASSERT_TRUE_MESSAGE(bias_missed() == nothing_known, "not unless it is asked for");
+
+    cfg.velocity.learn_bias = true;
+    init_by_gyro(&cfg);
+    fly_ms(300u, true);
+    TEST_ASSERT_TRUE_MESSAGE(bias_missed() < 0.95 * nothing_known, "learnt");
+    TEST_ASSERT_EQUAL_INT(EVS_OK, evs_attitude_set_bias(evs_pipeline_attitude(&p), told));
+    fly_ms(60u, true);
+    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-6, 0.0, bias_missed(), "once it is known it is not counted twice");
+
+    init_by_gyro(&cfg);
+    TEST_ASSERT_EQUAL_INT(EVS_OK, evs_attitude_set_bias(evs_pipeline_attitude(&p), told));
+    fly_ms(300u, true);
+    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-6, 0.0, bias_missed(), "nothing is learnt beside one that was told");
+    assert_right(0u, 4.0);
 }
 
 static void test_offset_between_the_clocks_is_that_of_the_track(void)
@@ -722,6 +776,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_shaken_camera_finds_its_direction_of_flight);
+    RUN_TEST(test_bias_of_the_gyro_is_learnt_until_it_is_known);
     RUN_TEST(test_offset_between_the_clocks_is_that_of_the_track);
     RUN_TEST(test_backwards_is_told_from_forwards);
     RUN_TEST(test_rotation_alone_is_no_flight);

@@ -109,7 +109,8 @@ typedef struct {                /** Settings; copied by evs_pipeline_init(). */
     size_t n_warp_events;           /**< Warp GLOBAL, TILED: events of a window that are kept, [1, 2^24]. Those that
                                                are too many are left out of the image, and counted. Default 0. */
     bool velocity_on;               /**< Measure the direction of flight; needs an image. Default false. */
-    evs_velocity_config_t velocity; /**< Its pinhole is set from the camera, its time offset from the track. */
+    evs_velocity_config_t velocity; /**< Its pinhole is set from the camera, its time offset from the track; learn_bias
+                                         counts with source IMU while the filter does not know the bias. */
 } evs_pipeline_config_t;
 
 /** A run of consecutive events of one window. The arrays stay valid until the next call with this context. */
@@ -157,6 +158,7 @@ typedef struct
     uint32_t duration_us; /* of the window before */
     uint32_t t_warp_us;   /* the time to which the open window is warped */
     bool warping;         /* the open window is being warped */
+    bool bias_known;      /* what images show is stabilized by a gyro whose bias is known */
     bool empty;           /* no event of the open window has been voted yet */
 } evs_pipeline_imaging_t;
 
@@ -170,6 +172,8 @@ typedef struct { /** Context. A complete type only so that you can place it: eve
     evs_quat_t view_kept_q;       /* attitude from view: what the view keeps to itself */
     uint64_t view_per_us_q50;     /* 1 / view_tau_ms */
     uint64_t view_max_per_us_q62; /* half of view_rate_max_mrad_s */
+    uint32_t bias_known_us;       /* since when the attitude knows the gyro's bias, by the events' clock */
+    bool bias_known;
     evs_orientation_track_t track;
     evs_undistort_t undistort;
     evs_window_t window;
@@ -246,7 +250,7 @@ evs_pipeline_config_t evs_pipeline_config_default(const evs_camera_config_t *cam
 
 /**
  * Defaults for measuring the direction of flight: images of warped events, no warp, windows by area that close with the
- * 12th event per pixel of a tile, after 5 to 50 ms, and a residual rotation rate of 0.002 rad/s.
+ * 12th event per pixel of a tile, after 5 to 50 ms, a residual rotation rate of 0.002 rad/s, and learn_bias.
  */
 evs_pipeline_config_t evs_pipeline_config_velocity(const evs_camera_config_t *camera);
 
@@ -307,6 +311,12 @@ EVS_NODISCARD evs_status_t evs_pipeline_newest_orientation(const evs_pipeline_t 
 
 /** The attitude filter, for its flags, bias and counters (read) or to give it an initial orientation and bias. */
 static inline evs_attitude_t *evs_pipeline_attitude(evs_pipeline_t *p) { return &p->attitude; }
+
+/**
+ * Source IMU: the gyro bias as far as it is known, in the IMU's frame, rad/s Q24: the filter's, and what the flow tells
+ * beyond it (velocity.learn_bias). Save it for evs_attitude_set_bias() at the next start.
+ */
+evs_vec3_t evs_pipeline_gyro_bias(const evs_pipeline_t *p);
 
 /** What happened to the input so far. */
 evs_pipeline_counts_t evs_pipeline_counts(const evs_pipeline_t *p);

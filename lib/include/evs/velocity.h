@@ -31,6 +31,7 @@
 #include "evs/egomotion.h"
 #include "evs/flow.h"
 #include "evs/flow_grid.h"
+#include "evs/gyro_bias.h"
 #include "evs/keyframes.h"
 #include "evs/orientation_track.h"
 
@@ -58,7 +59,9 @@ typedef struct {                      /** Settings; copied by evs_velocity_init(
     int32_t residual_rate_rad_s_q24;  /**< 1 sigma per axis of the rotation that stabilization may have left, as a rate:
                                            egomotion.rotation_sigma_rad_q28 is this times the interval, if that is more.
                                            [0, 2^24], default 0. */
-    uint16_t n_levels;                /**< Of the pyramids. [1, EVS_FLOW_LEVELS_MAX], default 2. */
+    bool learn_bias; /**< Learn the gyro's bias from the rotation that it leaves, see evs/gyro_bias.h. Only where images
+                          are stabilized by a gyro whose bias is not known. Default false. */
+    uint16_t n_levels;  /**< Of the pyramids. [1, EVS_FLOW_LEVELS_MAX], default 2. */
     uint16_t n_tracks;  /**< Most corners tracked, [8, 4096]; 0, the default: one per cell of the corners. */
     uint16_t grid_cols; /**< Tiles of the predicted flow. Default 8 x 6. */
     uint16_t grid_rows;
@@ -124,8 +127,10 @@ typedef struct { /** Context. A complete type only so that you can place it: eve
     evs_pyramid_t newest;
     evs_pyramid_t older;
     evs_velocity_result_t pair; /* what is known of the result already */
-    evs_quat_t middle_q_cr;     /* camera in the middle of the interval from reference */
-    uint32_t t_us;              /* of the newest image */
+    evs_gyro_bias_t bias;
+    evs_vec3_t left_rad_q28; /* rotation that the bias has left in the flow of this pair */
+    evs_quat_t middle_q_cr;  /* camera in the middle of the interval from reference */
+    uint32_t t_us;           /* of the newest image */
     const uint8_t *older_px;
     uint32_t stage;
     evs_velocity_counts_t counts;
@@ -228,6 +233,12 @@ static inline bool evs_velocity_track_is_inlier(const evs_velocity_t *v, const e
     const evs_egomotion_flow_t flow = evs_velocity_flow_of(v, track);
     return (track->status == EVS_FLOW_OK) && evs_egomotion_is_inlier(&result->solution, &flow);
 }
+
+/** The gyro bias that was learnt, in the camera's frame, rad/s Q24. */
+static inline evs_vec3_t evs_velocity_bias(const evs_velocity_t *v) { return v->bias.bias_q24; }
+
+/** Begin or go on learning it; or forget it, as when the gyro's bias has been learnt elsewhere and is subtracted now. */
+void evs_velocity_learn_bias(evs_velocity_t *v, bool on);
 
 /** What happened to the images so far. */
 static inline evs_velocity_counts_t evs_velocity_counts(const evs_velocity_t *v) { return v->counts; }
