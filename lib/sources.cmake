@@ -48,6 +48,7 @@ set(EVS_SOURCES
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_undistort_sse2.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_vec.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_velocity.c
+    ${CMAKE_CURRENT_LIST_DIR}/src/evs_velocity_mismatch.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_warp.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_warp_contrast.c
     ${CMAKE_CURRENT_LIST_DIR}/src/evs_wide.c

@@ -2,15 +2,14 @@
  * SPDX-FileCopyrightText: 2026 the evstab authors */
 #include "evs/velocity.h"
 
+#include "evs_velocity_private.h"
+
 #include <string.h>
 
 #define SPACING_MAX_US   UINT32_C(100000)
 #define RATE_MAX_Q24     (INT32_C(1) << 24)
 #define ROTATION_MAX_Q28 (INT32_C(1) << 28) /* of evs/egomotion.h */
 #define PREDICT_US       INT32_C(65536)     /* how long points follow the flow when the grid is turned */
-
-/* Windows are compared at every fourth pixel up to 12 px to either side of their middle. */
-enum { LOOK_PX = 12, LOOK_STEP_PX = 4 };
 
 #define INVALID (EVS_VELOCITY_FEW | EVS_VELOCITY_STILL | EVS_VELOCITY_UNSOLVED | EVS_VELOCITY_UNLIKE)
 
@@ -218,12 +217,6 @@ static void turn_grid(evs_velocity_t *v, evs_quat_t q_wr)
 
 /* --- stages ------------------------------------------------------------------------------------------------------- */
 
-static evs_image_t image_of(const evs_velocity_t *v, const uint8_t *px)
-{
-    const evs_image_t image = {px, v->cfg.keyframes.pinhole.width_px, v->cfg.keyframes.pinhole.height_px};
-    return image;
-}
-
 /* The camera's orientation in the middle of the interval. It is asked for at once: later the ring may know more, and the
  * result must not depend on when the steps are made. */
 static void look_up_orientation(evs_velocity_t *v)
@@ -242,7 +235,7 @@ evs_status_t evs_velocity_begin(evs_velocity_t *v, const evs_velocity_image_t *i
     if (v->stage != STAGE_IDLE) { return EVS_ERR_STATE; }
 
     uint8_t *const plane = evs_keyframes_plane(&v->keyframes);
-    const evs_image_t newest = image_of(v, plane);
+    const evs_image_t newest = evs_velocity_image_of(v, plane);
     if (image->px != plane) { memcpy(plane, image->px, EVS_IMAGE_BYTES(newest.width_px, newest.height_px)); }
     evs_count(&v->counts.n_images);
     v->n_tracks = 0u;
@@ -308,8 +301,8 @@ static void take_corners(evs_velocity_t *v)
 
 static void build_pyramids(evs_velocity_t *v)
 {
-    const evs_image_t newest = image_of(v, evs_keyframes_plane(&v->keyframes));
-    const evs_image_t older = image_of(v, v->older_px);
+    const evs_image_t newest = evs_velocity_image_of(v, evs_keyframes_plane(&v->keyframes));
+    const evs_image_t older = evs_velocity_image_of(v, v->older_px);
     const size_t n_bytes = EVS_PYRAMID_BYTES(newest.width_px, newest.height_px, v->cfg.n_levels);
     evs_status_t status = evs_pyramid_build(&v->newest, &newest, v->cfg.n_levels, v->work, n_bytes);
     if (status == EVS_OK) {
@@ -365,54 +358,6 @@ static uint32_t median(const uint32_t *values, size_t n)
         }
     }
     return low;
-}
-
-/* Sums of |newest - older| over every fourth pixel of two windows, as far as both lie in the image. */
-typedef struct {
-    uint32_t sum;
-    uint32_t n;
-} difference_t;
-
-static void add_difference(difference_t *d, const evs_image_t *newest, evs_position_t at, const evs_image_t *older,
-                           evs_position_t other)
-{
-    const int32_t x = evs_shr_r(at.x_q8, 8), y = evs_shr_r(at.y_q8, 8);
-    const int32_t to_x = evs_shr_r(other.x_q8, 8) - x, to_y = evs_shr_r(other.y_q8, 8) - y;
-    const int32_t width_px = newest->width_px, height_px = newest->height_px;
-    for (int32_t row = y - LOOK_PX; row <= y + LOOK_PX; row += LOOK_STEP_PX) {
-        if ((row < 0) || (row >= height_px) || (row + to_y < 0) || (row + to_y >= height_px)) { continue; }
-        const uint8_t *const a = &newest->px[row * width_px];
-        const uint8_t *const b = &older->px[(row + to_y) * width_px];
-        for (int32_t col = x - LOOK_PX; col <= x + LOOK_PX; col += LOOK_STEP_PX) {
-            if ((col < 0) || (col >= width_px) || (col + to_x < 0) || (col + to_x >= width_px)) { continue; }
-            const int32_t apart = (int32_t)a[col] - b[col + to_x];
-            d->sum += (uint32_t)((apart < 0) ? -apart : apart);
-            d->n++;
-        }
-    }
-}
-
-/* How much the windows of the tracks differ, over how much the windows of one track and of the track before differ. */
-static uint16_t mismatch_q8(const evs_velocity_t *v)
-{
-    const evs_image_t newest = image_of(v, evs_keyframes_plane(&v->keyframes));
-    const evs_image_t older = image_of(v, v->older_px);
-    difference_t same = {0u, 0u};
-    difference_t other = {0u, 0u};
-    const evs_flow_track_t *before = NULL;
-    for (size_t i = 0u; i < v->n_tracks; i++) {
-        const evs_flow_track_t *const track = &v->tracks[i];
-        if (track->status != EVS_FLOW_OK) { continue; }
-        add_difference(&same, &newest, track->from, &older, track->to);
-        if (before != NULL) { add_difference(&other, &newest, track->from, &older, before->to); }
-        before = track;
-    }
-    /* The means' quotient; fewer than 2^19 samples of fewer than 8 bits each. */
-    const uint64_t above = (uint64_t)same.sum * other.n * 256u;
-    const uint64_t below = (uint64_t)other.sum * same.n;
-    if (below == 0u) { return UINT16_MAX; }
-    const uint64_t quotient = (above + below / 2u) / below;
-    return (quotient < UINT16_MAX) ? (uint16_t)quotient : UINT16_MAX;
 }
 
 /* Keep what this pair tells about the next: where patches will be, and how far back to look. */
@@ -491,7 +436,7 @@ static void solve(evs_velocity_t *v)
     const size_t n = collect_flow(v, flow, lengths_q8);
     pair->n_flow = (uint16_t)n;
     pair->flow_px_q8 = median(lengths_q8, n);
-    pair->mismatch_q8 = mismatch_q8(v);
+    pair->mismatch_q8 = evs_velocity_mismatch_q8(v);
     const evs_egomotion_config_t cfg = egomotion_config(v);
     const evs_status_t status =
         evs_egomotion_solve(&cfg, flow, n, scratch, EVS_EGOMOTION_PAPER_BYTES(v->n_tracks_max), &pair->solution);
