@@ -73,7 +73,13 @@ enum {
 /* bench_egomotion.c */
 enum { BENCH_SOLVES = 8 };
 
-enum { BENCH_SOLVE_500 = 0, BENCH_SOLVE_500_ROTATION = 1, BENCH_SOLVE_100 = 2, BENCH_SOLVE_500_PLANE = 3 };
+enum {
+    BENCH_SOLVE_500 = 0,
+    BENCH_SOLVE_500_ROTATION = 1,
+    BENCH_SOLVE_100 = 2,
+    BENCH_SOLVE_500_PLANE = 3,
+    BENCH_BIAS_100 = 4,
+};
 
 /* bench_warp.c */
 enum { BENCH_WARP_EVENTS = 16000 };

@@ -81,6 +81,7 @@ PER_SOLVE = [
     ("the same from 100", "SOLVE_100"),
     ("from 500, on a plane, so that a rotation has to be ruled out", "SOLVE_500_PLANE"),
     ("from 500, with a prior on the residual rotation", "SOLVE_500_ROTATION"),
+    ("gyro bias: what a pair with 100 vectors tells of it", "BIAS_100"),
 ]
 
 

@@ -38,15 +38,20 @@ def row(name, cells):
 
 
 def generate():
-    flash, ram, stack, *_ = tables("memory.md", "memory")
-    events, *_ = tables("performance.md", "performance")
+    flash, ram, stack, *_, pipelines = tables("memory.md", "memory")
+    events, *_, calls = tables("performance.md", "performance")
     deepest = {core: str(max(int(cells[core]) for cells in stack.values())) for core in CORES}
     out = "| | " + " | ".join(CORES) + " |\n|---" + "|--:" * len(CORES) + "|\n"
     out += row("flash, all modules, bytes", flash["all modules"])
     out += row("RAM of its own, bytes", ram["all modules"])
     out += row("stack of the deepest call, bytes", deepest)
+    for name in ("stabilized events, 240 × 180", "… and the direction of flight, 240 × 180"):
+        out += row(f"memory of the caller, bytes: {name}", pipelines[name])
     out += row("instructions per event, exact table", events["**all: full table + window + rotation**"])
     out += row("instructions per event, grid of 3 KB", events["**all: grid + window + rotation**"])
+    direction = next(cells for name, cells in calls.items() if name.startswith("**direction of flight"))
+    out += row("million instructions per direction of flight, 180 features",
+               {core: f"{int(count) / 1e6:.1f}" for core, count in direction.items()})
     return out
 
 

@@ -12,7 +12,7 @@
  *          small bias stays near zero and a large one is not held back.
  *          Give it pairs whose direction is valid only.
  * Memory   one evs_gyro_bias_t.
- * Cost     on a Cortex-M4F (counted in QEMU) 68,000 instructions per pair and 800 per flow vector: one percent of what
+ * Cost     68,000 instructions per pair and 800 per flow vector on a Cortex-M4F (docs/performance.md): one percent of what
  *          the flow of the pair has cost.
  * Numeric  integers only, bit-exact on every target. Rates Q24 rad/s, in the camera's frame.
  * Time     wraps.
