@@ -66,8 +66,20 @@ def evstab(program, *arguments, **options):
     return subprocess.run([program, *map(str, arguments)], text=True, capture_output=True, timeout=120, **options)
 
 
-def browse(page, temp, *flags):
-    """@return what the page says about itself, and what the browser says about the page."""
+def browse(page, temp, *flags, until='"ready":true'):
+    """@return what the page says about itself, and what the browser says about the page.
+
+    The browser's virtual time does not wait for pictures that are being decoded elsewhere, so that now and then it is over
+    before the page is done. Then look again: a page that never gets that far is told as it is.
+    """
+    for _ in range(4):
+        seen = look_once(page, temp, *flags)
+        if until in seen[3]:
+            break
+    return seen
+
+
+def look_once(page, temp, *flags):
     profile = pathlib.Path(tempfile.mkdtemp(dir=temp))
     net_log = profile / "net.json"
     done = subprocess.run(
@@ -84,7 +96,7 @@ def browse(page, temp, *flags):
     requests = [line for line in log.splitlines()
                 if re.search(r'"url":"(?!file:|data:|chrome|devtools:)', line) and '"initiator":"' in line and
                 '"initiator":"not an origin"' not in line]
-    return (json.loads(html.unescape(status[1])) if status else None), console, requests, done.stdout
+    return (json.loads(html.unescape(status[1])) if status and status[1] else None), console, requests, done.stdout
 
 
 def check_page(page, temp, theme, flags, summary):
@@ -148,7 +160,8 @@ whenReady(() => {
 def check_hands(page, temp):
     handled = temp / "hands.html"
     handled.write_text(page.read_text(encoding="utf-8").replace("</body>", HANDS), encoding="utf-8")
-    _, console, _, dom = browse(handled, temp, "--force-prefers-reduced-motion", "--window-size=500,900")
+    _, console, _, dom = browse(handled, temp, "--force-prefers-reduced-motion", "--window-size=500,900",
+                                until='<p id="hands" hidden="">{')
     found = re.search(r'<p id="hands" hidden="">(.+?)</p>', dom, re.S)
     hands = json.loads(html.unescape(found[1])) if found else {}
     check("controls: no errors", bool(hands) and not console, (hands, console))
