@@ -15,7 +15,7 @@ enum {
     SCALE_WIDE = SCALE_MAX / 2,
     NOISE_VECTORS = 256, /* enough to choose a scale by */
     HALVES_Q8 = 37,      /* sigma is at least 1 / 2.6 of how far a half of the image is off, the square in 1/256 */
-    INLIER_LIMIT_MIN = 8 /* steps: the rounding of what is free of noise */
+    INLIER_LIMIT_MIN = 8 /* steps: the rounding of what has no noise */
 };
 
 evs_egomotion_config_t evs_egomotion_config_default(void)

@@ -162,8 +162,8 @@ void evs_ego_spread(const evs_ego_cell_sum_t *cells, unsigned dim, evs_scaled_t 
         n_used += (any != 0) ? 1 : 0;
     }
     /* the sum over all cells is zero at the minimum, in as many directions as were estimated */
-    const int32_t free = (n_used > (int32_t)dim) ? n_used - (int32_t)dim : 1;
-    const evs_scaled_t correction = evs_scaled_div(evs_scaled(n_used, 0), evs_scaled(free, 0));
+    const int32_t n_degrees = (n_used > (int32_t)dim) ? n_used - (int32_t)dim : 1;
+    const evs_scaled_t correction = evs_scaled_div(evs_scaled(n_used, 0), evs_scaled(n_degrees, 0));
     for (unsigned i = 0u; i < dim * (dim + 1u) / 2u; i++) { m[i] = evs_scaled_mul(m[i], correction); }
 }
 

@@ -50,7 +50,7 @@ typedef struct { /** A stored image. */
 
 typedef struct { /** Context. A complete type only so that you can place it: every member is private. */
     evs_keyframes_config_t cfg;
-    evs_keyframe_t stored[EVS_KEYFRAMES_MAX + 1u]; /* oldest first; behind them planes that are free */
+    evs_keyframe_t stored[EVS_KEYFRAMES_MAX + 1u]; /* oldest first; behind them the unused planes */
     size_t n_used;
     uint32_t speed_px_s_q4; /* running mean */
     uint32_t baseline_us;
