@@ -6,6 +6,7 @@
 
 #include <string.h>
 
+#define MAX_SIGMA_Q28    INT32_C(105414357) /* pi / 8: less sure than that is no direction to steer by */
 #define SPACING_MAX_US   UINT32_C(100000)
 #define RATE_MAX_Q24     (INT32_C(1) << 24)
 #define ROTATION_MAX_Q28 (INT32_C(1) << 28) /* of evs/egomotion.h */
@@ -31,6 +32,7 @@ evs_velocity_config_t evs_velocity_config_default(const evs_pinhole_t *pinhole)
                                  .grid_rows = EVS_FLOW_GRID_ROWS,
                                  .min_features = 20u,
                                  .min_flow_px_q8 = 256u,
+                                 .max_sigma_rad_q28 = MAX_SIGMA_Q28,
                                  .max_mismatch_q8 = 218u,
                                  .n_orientations = 64u,
                                  .orientation_spacing_us = 5000u,
@@ -119,8 +121,9 @@ static uint32_t per_focal_q32(int32_t focal_q16) { return (uint32_t)((UINT64_C(1
 evs_status_t evs_velocity_init(evs_velocity_t *v, const evs_velocity_config_t *cfg, void *memory, size_t n_bytes)
 {
     if ((v == NULL) || (cfg == NULL) || (memory == NULL)) { return EVS_ERR_NULL; }
-    if (!sizes_ok(cfg) || (cfg->min_features < 1u) || (cfg->orientation_spacing_us > SPACING_MAX_US) ||
-        (cfg->residual_rate_rad_s_q24 < 0) || (cfg->residual_rate_rad_s_q24 > RATE_MAX_Q24)) {
+    if (!sizes_ok(cfg) || (cfg->min_features < 1u) || !evs_in_range(cfg->max_sigma_rad_q28, 1, INT32_C(1) << 30) ||
+        (cfg->orientation_spacing_us > SPACING_MAX_US) || (cfg->residual_rate_rad_s_q24 < 0) ||
+        (cfg->residual_rate_rad_s_q24 > RATE_MAX_Q24)) {
         return EVS_ERR_ARG;
     }
     if ((n_bytes < evs_velocity_bytes(cfg)) || (((uintptr_t)memory & 7u) != 0u)) { return EVS_ERR_SIZE; }
@@ -446,7 +449,10 @@ static void solve(evs_velocity_t *v)
     if (n < v->cfg.min_features) { pair->flags |= EVS_VELOCITY_FEW; }
     if (pair->flow_px_q8 < v->cfg.min_flow_px_q8) { pair->flags |= EVS_VELOCITY_STILL; }
     if (pair->mismatch_q8 > v->cfg.max_mismatch_q8) { pair->flags |= EVS_VELOCITY_UNLIKE; }
-    if ((pair->solution.flags & EVS_EGOMOTION_VALID) == 0u) { pair->flags |= EVS_VELOCITY_UNSOLVED; }
+    if (((pair->solution.flags & EVS_EGOMOTION_VALID) == 0u) ||
+        (pair->solution.sigma_rad_q28 > v->cfg.max_sigma_rad_q28)) {
+        pair->flags |= EVS_VELOCITY_UNSOLVED;
+    }
     if ((pair->flags & INVALID) == 0u) {
         pair->flags |= EVS_VELOCITY_VALID;
         evs_count(&v->counts.n_valid);

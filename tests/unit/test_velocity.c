@@ -316,6 +316,23 @@ static void test_too_few_is_below_the_least_number(void)
     }
 }
 
+static void test_unsure_is_above_the_largest_sigma(void)
+{
+    fly(8u);
+    const evs_velocity_result_t last = results[n_results - 1u];
+    TEST_ASSERT_BITS_HIGH(EVS_VELOCITY_VALID, last.flags);
+    for (int32_t less = 0; less < 2; less++) {
+        evs_velocity_config_t cfg = evs_velocity_config_default(&pinhole);
+        cfg.max_sigma_rad_q28 = last.solution.sigma_rad_q28 - less;
+        init(&cfg);
+        fly(8u);
+        const evs_velocity_result_t *const r = &results[n_results - 1u];
+        TEST_ASSERT_BITS(EVS_VELOCITY_VALID | EVS_VELOCITY_UNSOLVED,
+                         (less == 0) ? EVS_VELOCITY_VALID : EVS_VELOCITY_UNSOLVED, r->flags);
+        TEST_ASSERT_BITS_HIGH(EVS_EGOMOTION_VALID, r->solution.flags); /* the solver is not asked */
+    }
+}
+
 static void test_object_that_moves_by_itself_over_a_third_of_the_image_does_not_mislead(void)
 {
     flight_mover_v[0] = -0.3;
@@ -550,7 +567,7 @@ static void test_init_refuses_what_any_module_refuses_and_leaves_the_context_alo
     TEST_ASSERT_EQUAL_INT(EVS_ERR_NULL, evs_velocity_init(&velocity, &good, NULL, N_BYTES));
     TEST_ASSERT_EQUAL_INT(EVS_ERR_SIZE, evs_velocity_init(&velocity, &good, memory, N_BYTES - 8u));
     TEST_ASSERT_EQUAL_INT(EVS_ERR_SIZE, evs_velocity_init(&velocity, &good, (uint8_t *)memory + 4, N_BYTES));
-    enum { N_BAD = 18 };
+    enum { N_BAD = 20 };
     evs_velocity_config_t bad[N_BAD];
     for (size_t i = 0u; i < N_BAD; i++) { bad[i] = good; }
     bad[0].keyframes.pinhole.fx_q16 = 0;
@@ -571,6 +588,8 @@ static void test_init_refuses_what_any_module_refuses_and_leaves_the_context_alo
     bad[15].track.max_gap_us = 0u;
     bad[16].residual_rate_rad_s_q24 = -1;
     bad[17].residual_rate_rad_s_q24 = (1 << 24) + 1;
+    bad[18].max_sigma_rad_q28 = 0;
+    bad[19].max_sigma_rad_q28 = (1 << 30) + 1;
     for (size_t i = 0u; i < N_BAD; i++) {
         TEST_ASSERT_EQUAL_INT(EVS_ERR_ARG, evs_velocity_init(&velocity, &bad[i], memory, N_BYTES));
     }
@@ -596,6 +615,7 @@ int main(void)
     RUN_TEST(test_images_that_have_nothing_in_common_are_flagged);
     RUN_TEST(test_scene_that_is_exchanged_ends_what_was_predicted);
     RUN_TEST(test_too_few_is_below_the_least_number);
+    RUN_TEST(test_unsure_is_above_the_largest_sigma);
     RUN_TEST(test_object_that_moves_by_itself_over_a_third_of_the_image_does_not_mislead);
     RUN_TEST(test_saccade_costs_no_result);
     RUN_TEST(test_predicted_flow_follows_the_reference);

@@ -43,7 +43,7 @@ extern "C" {
 #define EVS_VELOCITY_VALID          0x01u /**< The direction may be used: not FEW, STILL, UNSOLVED or UNLIKE. */
 #define EVS_VELOCITY_FEW            0x02u /**< Fewer than min_features displacements: too little texture. */
 #define EVS_VELOCITY_STILL          0x04u /**< They are too short: no motion, or rotation only. */
-#define EVS_VELOCITY_UNSOLVED       0x08u /**< They fit no direction: see solution.flags. */
+#define EVS_VELOCITY_UNSOLVED       0x08u /**< They fit no direction, or one too unsure: see solution. */
 #define EVS_VELOCITY_NO_ORIENTATION 0x10u /**< v_c_q30 is unknown (zero); v_r_q30 stands. */
 #define EVS_VELOCITY_UNLIKE         0x40u /**< The images do not show the same: noise, or too long a time apart. */
 #define EVS_VELOCITY_TURNED         0x20u /**< The keyframe was turned: a saccade lies between the two images. */
@@ -67,6 +67,7 @@ typedef struct {                      /** Settings; copied by evs_velocity_init(
     uint16_t grid_rows;
     uint16_t min_features;                /**< Fewest displacements of a valid result. At least 1, default 20. */
     uint16_t min_flow_px_q8;              /**< Shortest median displacement of a valid result. Default 256 (1 px). */
+    int32_t max_sigma_rad_q28;            /**< Largest sigma of a valid direction. [1, 2^30], default pi / 8. */
     uint16_t max_mismatch_q8;             /**< Largest mismatch of a valid result, see there. Default 218 (0.85). */
     uint16_t n_orientations;              /**< Orientations kept. At least 4, default 64. */
     uint32_t orientation_spacing_us;      /**< Those that follow closer are left out. [0, 100000], default 5000. */
